@@ -85,9 +85,11 @@ def collect_result(engine: Engine, state: JobState) -> Result:
 def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
     evidence, members = found.evidence, found.members
     warnings = make_notes("enclose", found.notes)
-    deposit, damage = found.deposit, found.damage
+    deposit, damage, enclosures = found.deposit, found.damage, found.enclosures
     if isinstance(deposit, Deposit):
-        damage = damage if deposit.milled is not None else deposit.cavity or damage
+        if deposit.milled is None and deposit.cavity is not None:
+            damage = deposit.cavity
+            enclosures = () if deposit.opening is None else (deposit.opening,)
         warnings += make_notes("allowance", deposit.notes)
     path = found.path
     if path is not None:
@@ -104,7 +106,7 @@ def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
         accepted=found.accepted,
         uncertainty=shift_uncertainty(found.uncertainty, damage.volume - found.damage.volume),
         volume_rates=tuple(one.rate for one in found.dependences),
-        enclosures=found.enclosures if damage is found.damage else (),
+        enclosures=enclosures,
         path=path,
         method=found.method,
         evidence=evidence,

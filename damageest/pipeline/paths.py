@@ -54,7 +54,7 @@ def _find_cavity(site: FoundSite) -> tuple[Solid, Solid | None]:
     """The cavity of a site, and what takes it out of the part, where that is known."""
     deposit = site.deposit
     if isinstance(deposit, Deposit) and deposit.cavity:
-        return deposit.cavity, deposit.opening
+        return deposit.cavity, deposit.opening if deposit.milled is not None else None
     return site.damage, None
 
 

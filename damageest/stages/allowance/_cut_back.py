@@ -23,8 +23,11 @@ ROUGH = 2.0
 """Largest edge of a grid cell where the surface is fitted afterwards."""
 
 
-def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tolerance: float) -> Solid:
-    """The damage volume and all metal within ``inner`` of its inner damage surface, and up to half a tolerance more.
+def cut_back(
+    damage: Solid, part: Part, others: Solid | None, inner: float, tolerance: float
+) -> tuple[Solid, Solid | None]:
+    """The damage volume and all metal within ``inner`` of its inner damage surface, and up to half a tolerance more;
+    and what takes it out of the part (see `Deposit.opening`), None where that is not known.
 
     ``others``: damage volumes of other sites, which the cavity leaves out. Raises StageError where the grid would not
     fit in memory, or the volumes do not add up.
@@ -33,7 +36,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
     lost, whole = to_manifold(damage, origin), to_manifold(part, origin)
     inside = find_inner_faces(damage, part)
     if not inside.any():
-        return damage
+        return damage, None
     region = to_manifold(_grow_faces(damage, damage.faces[inside], part, inner, tolerance), origin)
     region = region.simplify(tolerance / 16)
     near = None if others is None else _take_near(others, np.reshape(region.bounding_box(), (2, 3)) + origin)
@@ -57,7 +60,7 @@ def cut_back(damage: Solid, part: Part, others: Solid | None, inner: float, tole
             f"the volumes of the cut-back do not add up: {missing:.3g} is lost or counted twice",
             "use a slightly different inner, or boolean: pymeshlab",
         )
-    return solid
+    return solid, to_solid(region + lost, origin)
 
 
 def _take_near(others: Solid, bounds: Floats) -> Solid | None:

@@ -85,8 +85,7 @@ class Milling(Allowance):
 
         origin: Floats = part.bounds.mean(axis=0)
         plan = StockPlan(self.outer, self.targets, self.keep_out)
-        cavity = cut_back(damage, part, others, self.inner, tolerance) if self.inner else damage
-        opening = None
+        cavity, opening = cut_back(damage, part, others, self.inner, tolerance) if self.inner else (damage, None)
         if self.prepare is not None:
             cavity, opening = open_cavity(cavity, part, others, self.prepare, tolerance)
         hole, whole = to_manifold(cavity, origin), to_manifold(part, origin)

@@ -43,12 +43,14 @@ class ExactMilled:
 def take_opened(site: SiteInput, part: Part) -> SiteInput | None:
     """The cavity of a site as what is to be cut out of the part; None where it was not opened."""
     deposit = site.deposit
-    if not isinstance(deposit, Deposit) or deposit.opening is None or deposit.cavity is None:
-        return None
+    if not isinstance(deposit, Deposit) or deposit.milled is None:
+        return None  # after a cut-back alone, the cavity is the damage volume of the site
+    assert deposit.cavity is not None
     cavity = deposit.cavity
     # no scan has seen what milling leaves
+    enclosures = () if deposit.opening is None else (deposit.opening,)
     return replace(
-        site, damage=cavity, surface=extract_ids(cavity, part), enclosures=(deposit.opening,), points=np.empty((0, 3))
+        site, damage=cavity, surface=extract_ids(cavity, part), enclosures=enclosures, points=np.empty((0, 3))
     )
 
 

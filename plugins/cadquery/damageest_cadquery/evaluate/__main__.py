@@ -34,6 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--step", type=Path, nargs="*", default=[], help="STEP files to use besides the built-in parts")
     parser.add_argument("--files", type=Path, help="folder of CAD files: a damage on each that --output has no row of")
     parser.add_argument("--write", type=Path, help="write the built-in parts as STEP files to this folder, no more")
+    parser.add_argument("--prepare", action="store_true", help="of --files: open the cavities before deposition")
     parser.add_argument("--limit", type=float, default=180.0, help="longest time for one of --files, in seconds")
     chosen = parser.parse_args(arguments)
     start = time.perf_counter()
@@ -63,7 +64,8 @@ def _measure_files(chosen: argparse.Namespace, start: float) -> None:
     from damageest_cadquery.evaluate.files import measure_folder
     from damageest_cadquery.evaluate.files_rows import read_rows, summarise_files
 
-    for number, row in enumerate(measure_folder(chosen.files, chosen.output, chosen.first, chosen.limit), start=1):
+    rows = measure_folder(chosen.files, chosen.output, chosen.first, chosen.limit, chosen.prepare)
+    for number, row in enumerate(rows, start=1):
         print(number, f"{time.perf_counter() - start:.0f} s", row["file"], row.get("error", "measured"), flush=True)
         if time.perf_counter() - start > chosen.seconds:
             break

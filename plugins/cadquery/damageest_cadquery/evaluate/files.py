@@ -23,6 +23,8 @@ CHORD = 1 / 32
 """Of the part's triangles, in tolerances: a fourth of the default, so that volumes differ by little because of it."""
 STOCK = 2.0
 """Height of the stock on the deposits, in tolerances."""
+RADIUS = 3.0
+"""Radius of the cutter for which cavities are opened, in tolerances."""
 LIMIT = 60.0
 """Longest time for the exact form of a damage volume or of a deposit, in seconds of the processor: the default of
 `export.limit`."""
@@ -30,10 +32,13 @@ SIZES = (100_000, 300_000)
 """Bytes from which a file comes after the smaller ones."""
 
 
-def measure_folder(folder: Path, output: Path, first: int, seconds: float) -> Iterator[dict[str, Any]]:
+def measure_folder(
+    folder: Path, output: Path, first: int, seconds: float, prepare: bool = False
+) -> Iterator[dict[str, Any]]:
     """A row for each CAD file of ``folder`` that ``output`` has no row of, also appended to it.
 
     ``first`` changes the random damages. ``seconds``: the longest time for a file, after which its row has an error.
+    ``prepare``: whether cavities are opened before deposition.
     """
     from damageest_cadquery.brep import Brep
 
@@ -44,7 +49,7 @@ def measure_folder(folder: Path, output: Path, first: int, seconds: float) -> It
         if path.name in done:
             continue
         start = time.perf_counter()
-        row = _measure(path, first, seconds) | {"seconds": round(time.perf_counter() - start, 1)}
+        row = _measure(path, first, seconds, prepare) | {"seconds": round(time.perf_counter() - start, 1)}
         with output.open("a") as stream:
             stream.write(json.dumps(row) + "\n")
         yield row
@@ -55,7 +60,7 @@ def _rank(path: Path) -> tuple[int, int, str]:
     return sum(size > each for each in SIZES), zlib.crc32(path.name.encode()), path.name
 
 
-def _measure(path: Path, first: int, seconds: float) -> dict[str, Any]:
+def _measure(path: Path, first: int, seconds: float, prepare: bool) -> dict[str, Any]:
     """A row. The run is in one process, which starts but once; where it crashes or is late, the run is repeated in the
     processes that a user's has. Another process reads the files."""
     from damageest.errors import StageError
@@ -64,7 +69,7 @@ def _measure(path: Path, first: int, seconds: float) -> dict[str, Any]:
     start = time.perf_counter()
     limits, read_limits = Limits(seconds=seconds), Limits(seconds=seconds / 2)
     with tempfile.TemporaryDirectory(prefix="damageest-files-") as place:
-        arguments = {"path": path, "first": first, "place": Path(place)}
+        arguments = {"path": path, "first": first, "place": Path(place), "prepare": prepare}
         row: dict[str, Any] = {}
         for nested in (False, True):
             try:
@@ -78,7 +83,7 @@ def _measure(path: Path, first: int, seconds: float) -> dict[str, Any]:
                 if time.perf_counter() - start > 0.9 * seconds:
                     break
         for site in row.get("sites", []):
-            for what in ("damage", "deposit"):
+            for what in ("damage", "deposit", "milled"):
                 if what not in site:
                     continue
                 given = {"path": Path(place) / f"out/{what}/site-{site['site']}.step", "coloured": row["coloured"]}
@@ -96,9 +101,10 @@ def shorten(error: BaseException) -> str:
     return " ".join(str(error).split())[:300] or type(error).__name__
 
 
-def measure_file(path: Path, first: int, place: Path) -> dict[str, Any]:
+def measure_file(path: Path, first: int, place: Path, prepare: bool = False) -> dict[str, Any]:
     """A row: the random damage on the part of a file, and for each site what was written, to ``place``; or
-    ``error``, and as ``kind`` whether the file was refused, has no damage, or failed."""
+    ``error``, and as ``kind`` whether the file was refused, has no damage, or failed. ``prepare``: whether cavities are
+    opened before deposition."""
     from damageest.errors import DamageestError
     from damageest_cadquery.brep import Brep
 
@@ -115,7 +121,7 @@ def measure_file(path: Path, first: int, place: Path) -> dict[str, Any]:
     except LookupError as error:
         return row | {"error": shorten(error), "kind": "no damage"}
     try:
-        return row | {"kinds": kinds} | _measure_run(path, place, tolerance, row["seed"], tools)
+        return row | {"kinds": kinds} | _measure_run(path, place, tolerance, row["seed"], tools, prepare)
     except DamageestError as error:
         return row | {"kinds": kinds, "error": shorten(error), "kind": "failed"}
 
@@ -149,19 +155,25 @@ def _draw_damage(part: Any, seed: int) -> tuple[list[str], list[dict[str, Any]]]
     return list(drawn.kinds), [tool.model_dump(mode="json") for tool in drawn.tools]
 
 
-def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Sequence[Any]) -> dict[str, Any]:
+def _measure_run(
+    path: Path, place: Path, tolerance: float, seed: int, tools: Sequence[Any], prepare: bool
+) -> dict[str, Any]:
     import damageest
+    from damageest.artefacts import Deposit
     from damageest.stages.export import Body
     from damageest_cadquery.evaluate.fair import measure_fairly
     from damageest_cadquery.exact import write_exact
     from damageest_cadquery.shapes import read, scale_shape
 
+    allowance: dict[str, Any] = {"use": "milling", "outer": STOCK * tolerance}
+    if prepare:
+        allowance["prepare"] = {"min_radius": RADIUS * tolerance}
     job = {
         "version": 1, "units": "mm", "tolerance": tolerance, "align": "none",
         "part": {"use": "brep", "path": str(path), "chord": CHORD * tolerance},
         "scan": {"use": "simulate", "points": POINTS, "noise": NOISE * tolerance / TOLERANCE, "seed": seed,
                  "damage": list(tools)},
-        "accept": "all", "report": "none", "allowance": {"use": "milling", "outer": STOCK * tolerance},
+        "accept": "all", "report": "none", "allowance": allowance,
         "export": {"format": ["stl"]},
     }  # fmt: skip
     result = damageest.run(job, output=place / "run", cache=False)
@@ -171,6 +183,8 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
         bodies[f"damage/site-{site.id}"] = Body(f"damage site-{site.id}", site.damage, (0, 0, 0))
         if site.deposit is not None:
             bodies[f"deposit/site-{site.id}"] = Body(f"deposit site-{site.id}", site.deposit, (0, 0, 0))
+            if isinstance(site.deposit, Deposit) and site.deposit.milled is not None:
+                bodies[f"milled/site-{site.id}"] = Body(f"milled site-{site.id}", site.deposit.milled, (0, 0, 0))
     forms = write_exact(place / "out", result, bodies, {"": None}, LIMIT, assembly=False).exact
     coloured = _count_coloured(path)
     solids = [scale_shape(each, result.part.cad_scale) for each in read(path, path.suffix.lower()).solids]
@@ -183,10 +197,13 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
             row["skin"] = _measure_skin(site.damage, result.part)
         made = exact.get("deposit")
         if made and not made["reason"]:
-            row["deposit"] = {"mesh": _measure_deposit(site, result, tolerance)}
+            row["deposit"] = {"mesh": _measure_deposit(site, result, tolerance, allowance)}
         elif not made:
             row["no_deposit"] = " ".join("; ".join(result.failures).split())[:300] or "the run gave none"
-        if "damage" in row:
+        opened = site.deposit if isinstance(site.deposit, Deposit) else None
+        if opened and opened.milled and opened.cavity and not exact["milled"]["reason"]:
+            row["milled"] = {"mesh": opened.milled.volume, "of": opened.cavity.volume}
+        if "damage" in row and not prepare:
             truth = result.scan.truth.damage if result.scan.truth else None
             measure_fairly(row, solids, result.part, site.damage, truth, place / "out", tolerance, STOCK * tolerance)
         sites.append(row)
@@ -195,13 +212,13 @@ def _measure_run(path: Path, place: Path, tolerance: float, seed: int, tools: Se
     return {"coloured": coloured, "sites": sites, "warnings": [str(each)[:200] for each in said.get("warnings", [])]}
 
 
-def _measure_deposit(site: Any, result: Any, tolerance: float) -> float:
+def _measure_deposit(site: Any, result: Any, tolerance: float, allowance: dict[str, Any]) -> float:
     """The volume of the mesh with stock as high as that of the exact form; the run's is a quarter tolerance higher."""
     from damageest.errors import StageError
     from damageest.registry import Registry
 
     milling: Any = Registry.discover().get("allowance", "milling").cls
-    stage = milling(outer=(STOCK - 0.25) * tolerance)
+    stage = milling(**{**allowance, "outer": (STOCK - 0.25) * tolerance})
     try:
         deposit = stage.run(site.damage, result.part, tolerance, None)
     except StageError:

@@ -43,11 +43,12 @@ def find_faults(read: dict[str, Any]) -> list[str]:
 
 
 def measure_off(read: dict[str, Any]) -> float:
-    """The relative difference between the volume read back and the mesh's."""
+    """The difference between the volume read back and the mesh's, as a share of the latter; of metal to mill off, of
+    the cavity that it opens."""
     if not np.isfinite(read["mesh"]):
         return float("nan")
     found = [read["volume"], *([] if read["by_triangles"] is None else [read["by_triangles"]])]
-    return float(min(abs(volume / read["mesh"] - 1) for volume in found))
+    return float(min(abs(volume - read["mesh"]) for volume in found) / read.get("of", read["mesh"]))
 
 
 def measure_fairly(site: dict[str, Any], what: str) -> float | None:
@@ -98,8 +99,10 @@ def summarise_files(rows: Sequence[dict[str, Any]]) -> str:
     sites = [(row, site) for row in rows for site in row.get("sites", [])]
     measured = len(rows) - sum(lost.values())
     lines = [f"{len(rows)} files, {measured} measured, {len(sites)} damages; not measured: {dict(lost)}"]
-    for what in ("damage", "deposit"):
+    for what in ("damage", "deposit", "milled"):
         mine = [(row, site) for row, site in sites if what in site]
+        if what == "milled" and not any(site["exact"].get("milled") for _, site in sites):
+            continue
         faults = [(row, site, find_faults(site[what])) for row, site in mine]
         bad = [each for each in faults if each[2]]
         good = len(mine) - len(bad)
@@ -115,7 +118,9 @@ def summarise_files(rows: Sequence[dict[str, Any]]) -> str:
             lines.append(f"  {row['file']}, damage: {exact['tried'][-1] if exact['tried'] else 'unknown'}")
         elif exact.get("deposit") and exact["deposit"]["reason"]:
             lines.append(f"  {row['file']}, deposit: {exact['deposit']['reason']}")
-        elif "no_deposit" in site:
+        if exact.get("milled") and exact["milled"]["reason"]:
+            lines.append(f"  {row['file']}, milled: {exact['milled']['reason']}")
+        if "no_deposit" in site:
             lines.append(f"  {row['file']}, no deposit: {site['no_deposit']}")
     lines += [f"  {row['file']}, {row['kind']}: {row['error']}" for row in rows if "error" in row]
     return "\n".join(lines)
