@@ -140,8 +140,8 @@ class Deposit(Solid):
     in `Part.faces_brep`, empty where the part has none. ``heights``: of the damage's CAD faces by number, how high the
     job wants the stock on it, -1 where that is not the same all over it; ``overlap``: how far the stock covers the
     intact skin. ``notes`` are warnings. ``opening``: a solid that takes the cavity out of the part and stands out of
-    it, None where the cavity is the damage volume or that is not known. Where the cavity was opened, no face of it lies on
-    the skin, so that a difference leaves nothing over the opening.
+    it, None where the cavity is the damage volume or that is not known. Where the cavity was opened, no face of it lies
+    on the skin, so that a difference leaves nothing over the opening.
     """
 
     cavity: Solid | None = None

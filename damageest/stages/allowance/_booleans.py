@@ -33,6 +33,14 @@ def keep_touching(stock: Any, filled: Any, tolerance: float) -> Any:
     return compose_shells(pieces)
 
 
+def drop_crumbs(body: Any, least: float) -> Any:
+    """A Manifold without the pieces, and the voids in it, of at most ``least`` in volume: rounding errors of a Boolean
+    operation."""
+    pieces = body.decompose()
+    kept = [piece for piece in pieces if abs(piece.volume()) > least]
+    return body if len(kept) == len(pieces) else compose_shells(kept)
+
+
 def join(filled: Any, stock: Any) -> Any:
     """The union of cavity and stock: the first of several ways whose volume adds up, else the one nearest to that."""
     expected = filled.volume() + stock.volume() - (filled ^ stock).volume()

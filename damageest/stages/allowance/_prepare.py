@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -11,7 +10,7 @@ from pydantic import Field
 
 from damageest.artefacts import Flags, Floats, Mesh, Part, Solid, Vector
 from damageest.errors import StageError
-from damageest.geometry.distance import signed_distance
+from damageest.geometry.duplicates import list_used
 from damageest.geometry.rays import prepare_rays
 from damageest.geometry.refinement import halve_edges
 from damageest.geometry.skin import find_inner_faces
@@ -30,6 +29,8 @@ SHALLOW = 0.5
 """Cells of the grid by which a place has to be lower than the cutter comes for it to count as narrow."""
 SLACK = 1.5
 """Cells of the grid by which the cutter is thinner where it is looked whether it comes down."""
+SIMPLE = 1 / 8
+"""Tolerances by which the surface of the opened cavity is simplified."""
 CRUMB = 1e-9
 """Share of the damage volume below which metal to mill off is rounding."""
 
@@ -116,8 +117,8 @@ def open_cavity(
     direction = _find_direction(damage, part, prepare)
     origin, turn = damage.bounds.mean(axis=0), turn_to_axis(direction).T
     turned = Mesh((damage.vertices - origin) @ turn.T, damage.faces)
-    room = _raise_room(turned, part, origin, turn, prepare, tolerance)
-    room = room.simplify(tolerance / 8).transform(np.column_stack([turn.T, np.zeros(3)]))
+    room = _raise_room(turned, ~find_inner_faces(damage, part), part, origin, turn, prepare, tolerance)
+    room = room.simplify(SIMPLE * tolerance).transform(np.column_stack([turn.T, np.zeros(3)]))
     whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
     # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
     opening = room + lost
@@ -132,34 +133,31 @@ def open_cavity(
     return cavity, to_solid(opening, origin)
 
 
-def _raise_room(damage: Mesh, part: Part, origin: Floats, turn: Floats, prepare: Prepare, tolerance: float) -> Any:
-    """The column over the floor of the opened cavity, a Manifold, with z along the direction as the damage; ``origin``
-    (3,) and ``turn`` (3,3): where that frame lies in the part's."""
+def _raise_room(
+    damage: Mesh, skin: Flags, part: Part, origin: Floats, turn: Floats, prepare: Prepare, tolerance: float
+) -> Any:
+    """The column over the floor of the opened cavity, a Manifold, with z along the direction as the damage, of which
+    the faces ``skin`` (F,) lie on that of the part; ``origin`` (3,) and ``turn`` (3,3): where that frame lies in the
+    part's."""
     high, deep = float(damage.bounds[1, 2]), float(np.ptp(damage.bounds[:, 2])) + prepare.depth
     top, limit = high + tolerance / 4, high + deep
-
-    def is_free(places: Floats) -> Flags:
-        return np.asarray(signed_distance(origin + places @ turn, part)[0] > 0)
 
     def measure(one: _Column) -> Floats:
         low, high = (origin + places @ turn for places in one.place_between(top, limit))
         return _measure_metal(part, low, high, turn[2])
 
-    column = _open_floor(damage, is_free, prepare, tolerance, deep, top)
-
+    column = _open_floor(damage, skin, prepare, tolerance, deep, top)
     if (measure(column) > 0).any():
         # metal that is higher than the damage stands over it, and is removed where it is not a wall
-        higher = _open_floor(damage, is_free, prepare, tolerance, deep + limit - top, limit)
+        higher = _open_floor(damage, skin, prepare, tolerance, deep + limit - top, limit)
         if np.isfinite(measure(higher)).all():
             column = higher
     return column.raise_body()
 
 
-def _open_floor(
-    damage: Mesh, is_free: Callable[[Floats], Flags], prepare: Prepare, tolerance: float, deep: float, top: float
-) -> _Column:
-    """The column over the floor of the opened cavity up to the height ``top``, from which it is ``deep``. ``is_free``:
-    whether places (N,3) lie outside the part."""
+def _open_floor(damage: Mesh, skin: Flags, prepare: Prepare, tolerance: float, deep: float, top: float) -> _Column:
+    """The column over the floor of the opened cavity up to the height ``top``, from which it is ``deep``. ``skin``:
+    which faces (F,) of the damage lie on the part's skin."""
     from scipy import ndimage
 
     low, high = damage.bounds[:, :2]
@@ -169,13 +167,10 @@ def _open_floor(
     cell = max(min(tolerance, prepare.min_radius / FINE if prepare.min_radius else np.inf), size / NODES)
     nx, ny = (np.ceil((high - low + 2 * out) / cell).astype(int) + 5).tolist()
     corner = low - out - 2 * cell
-    lowest, around = _lower_floor(damage, corner, (nx, ny), cell)
-    # outside the part it costs no metal, and the skin of the damage lies in the column all the way down
-    places = _Column(around, corner, cell, top).places
-    rim = np.flatnonzero(around.ravel() < lowest.ravel())
-    beside = rim[is_free(np.column_stack([places.reshape(-1, 2)[rim], around.ravel()[rim]]))]
-    lowest.ravel()[beside] = around.ravel()[beside]
-    floor = np.minimum(lowest - prepare.depth, top)
+    lowest = _lower_floor(damage, corner, (nx, ny), cell)
+    # the column stands out of the part all round, also where steps of the grid or simplification round its walls
+    outside = _lower_round(Mesh(damage.vertices, damage.faces[skin]), corner, (nx, ny), cell)
+    floor = np.minimum(np.minimum(lowest, outside - SIMPLE * tolerance) - prepare.depth, top)
     cone: Any = -_draw_cone(deep / slope, cell, slope) if np.isfinite(slope) else np.zeros((1, 1))
     floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
     if prepare.min_radius > 0:
@@ -215,18 +210,26 @@ def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
     return np.asarray(normalise(total[None])[0])
 
 
-def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> tuple[Floats, Floats]:
-    """The lowest place of a mesh in the cell round each node of a grid, and in the cells that touch the node; infinite
-    where there is none."""
+def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:
+    """The lowest place of a mesh in the cell round each node of a grid; infinite where there is none."""
     fine = halve_edges(mesh, cell / 2).vertices
-    place = (fine[:, :2] - corner) / cell
-    first = np.floor(place).astype(int)
-    lowest, around = np.full(shape, np.inf), np.full(shape, np.inf)
-    np.minimum.at(lowest, tuple(np.round(place).astype(int).T), fine[:, 2])
+    node = np.round((fine[:, :2] - corner) / cell).astype(int)
+    floor = np.full(shape, np.inf)
+    np.minimum.at(floor, (node[:, 0], node[:, 1]), fine[:, 2])
+    return floor
+
+
+def _lower_round(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:
+    """The lowest place of a mesh in the four cells between nodes that meet in each node of a grid; infinite where there
+    is none. A surface through these heights lies nowhere above the mesh."""
+    fine = halve_edges(mesh, cell / 2)
+    places = fine.vertices[list_used(fine.faces)]
+    first = np.floor((places[:, :2] - corner) / cell).astype(int)
+    floor = np.full(shape, np.inf)
     for x in (0, 1):
         for y in (0, 1):
-            np.minimum.at(around, (first[:, 0] + x, first[:, 1] + y), fine[:, 2])
-    return lowest, around
+            np.minimum.at(floor, (first[:, 0] + x, first[:, 1] + y), places[:, 2])
+    return floor
 
 
 def _draw_cone(radius: float, cell: float, slope: float) -> Floats:
