@@ -83,9 +83,10 @@ def find_milled(cavity: Exact, damage: Exact, deposit: Deposit, part: Part, tole
     if any(origin == (-1, -1) for piece in pieces for origin in piece.origins):
         raise StockError("faces of unknown origin")
     volume = sum(measure_volume(piece.shape) for piece in pieces)
-    wanted = _measure_difference(opened, lost, deposit.cavity.bounds.mean(axis=0), tolerance)
-    if abs(volume - wanted) > SAME * deposit.cavity.volume + CRUMB * deposit.milled.volume:
-        raise StockError(f"its volume differs by {volume / wanted - 1:+.2%} from cavity without damage volume")
+    # all of it as triangles, whose chords make the same of curved faces
+    wanted, whole = _measure_difference(opened, lost, pieces, deposit.cavity.bounds.mean(axis=0), tolerance)
+    if abs(whole + sum(volumes) - volume - wanted) > SAME * deposit.cavity.volume:
+        raise StockError(f"its volume differs by {whole / wanted - 1:+.2%} from cavity without damage volume")
     room = VOLUME * deposit.cavity.volume + part.tessellation_error * _measure_curved(pieces)
     if abs(volume - deposit.milled.volume) > room:
         raise StockError(f"its volume differs by {volume / deposit.milled.volume - 1:+.2%}")
@@ -104,9 +105,11 @@ def _take(solid: Any, owner: int, known: ShapeMap) -> Piece:
     return Piece(solid, owner, tuple(known.get(face, none) for face in explore_faces(solid)))
 
 
-def _measure_difference(opened: Sequence[Piece], lost: Sequence[Piece], origin: Floats, tolerance: float) -> float:
-    """The volume of the cavity without the damage volume, by their triangles. Raises StockError where these do not
-    close."""
+def _measure_difference(
+    opened: Sequence[Piece], lost: Sequence[Piece], milled: Sequence[Piece], origin: Floats, tolerance: float
+) -> tuple[float, float]:
+    """The volumes of the cavity without the damage volume, and of what is milled off, by their triangles. Raises
+    StockError where these do not close."""
     from manifold3d import Manifold, OpType
 
     def unite(pieces: Sequence[Piece]) -> Any:
@@ -114,7 +117,7 @@ def _measure_difference(opened: Sequence[Piece], lost: Sequence[Piece], origin: 
         return Manifold.batch_boolean([to_manifold(mesh, origin) for mesh in meshes], OpType.Add)
 
     try:
-        return float((unite(opened) - unite(lost)).volume())
+        return float((unite(opened) - unite(lost)).volume()), float(unite(milled).volume())
     except (InputError, ValueError) as error:
         raise StockError(f"its triangles do not close ({str(error)[:80]})") from None
 

@@ -6,7 +6,7 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from damageest_cadquery import _exact, _worker
+from damageest_cadquery import _exact, _sites, _worker
 from damageest_cadquery._request import Made, Request
 
 Find = Callable[..., Any]
@@ -102,9 +102,26 @@ def find_none_beyond(request: Request) -> Made:
     return make_with(find_or_fail, request)
 
 
+def abort_at_opened(request: Request) -> Made:
+    """Aborts where an opened cavity, which no scan has seen, is cut out."""
+
+    def find_or_abort(find: Find, site: Any, *rest: Any) -> Any:
+        if not len(site.points):
+            os.abort()
+        return find(site, *rest)
+
+    return make_with(find_or_abort, request)
+
+
+def abort_at_milled(request: Request) -> Made:
+    """Aborts where the damage volume is cut out of an opened cavity."""
+    vars(_sites)["find_milled"] = lambda *values: os.abort()
+    return _worker.make_exact(request)
+
+
 def make_with(replaced: Callable[..., Any], request: Request) -> Made:
     """As `make_exact`, with ``replaced`` in the place of `find_exact`, which it gets as its first argument."""
-    names = vars(_worker)
+    names = vars(_sites)
     find = names["find_exact"]
     names["find_exact"] = lambda *values: replaced(find, *values)
     return _worker.make_exact(request)
