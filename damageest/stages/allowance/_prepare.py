@@ -31,6 +31,8 @@ SLACK = 1.5
 """Cells of the grid by which the cutter is thinner where it is looked whether it comes down."""
 SIMPLE = 1 / 8
 """Tolerances by which the surface of the opened cavity is simplified."""
+CLEAR = 2.0
+"""Tolerances by which what the cutter opens goes on above the damage where there is no metal."""
 CRUMB = 1e-9
 """Share of the damage volume below which metal to mill off is rounding."""
 
@@ -146,7 +148,10 @@ def _raise_room(
         low, high = (origin + places @ turn for places in one.place_between(top, limit))
         return _measure_metal(part, low, high, turn[2])
 
-    column = _open_floor(damage, skin, prepare, tolerance, deep, top)
+    # where nothing is in the way, it stands well out of the part, also over a sharp edge
+    column = _open_floor(damage, skin, prepare, tolerance, deep + CLEAR * tolerance, high + CLEAR * tolerance)
+    if (measure(column) > 0).any():
+        column = _open_floor(damage, skin, prepare, tolerance, deep, top)
     if (measure(column) > 0).any():
         # metal that is higher than the damage stands over it, and is removed where it is not a wall
         higher = _open_floor(damage, skin, prepare, tolerance, deep + limit - top, limit)
