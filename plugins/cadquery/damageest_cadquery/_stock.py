@@ -22,6 +22,7 @@ from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, close, explore_faces, naming, orient_solid, settle_edges
 from damageest_cadquery._split import Piece, is_watertight, measure_volume
 from damageest_cadquery._walls import build_wall
+from damageest_cadquery._wedge import build_end, build_wedge, is_narrow
 
 FLAT = 1e-6
 """Volume of a corner, in cubes of the height, below which there is none."""
@@ -72,19 +73,37 @@ def build_parts(bases: Sequence[Base]) -> list[Lump]:
             "an edge between the faces is sharp in part only, or changes between convex and concave",
             (bases[k].number for edge in mixed for k in (edge.first, edge.second)),
         )
-    label = _group(edges, heights)
+    narrow = _find_narrow(edges, bases)
+    label = _group([edge for edge in edges if not {edge.first, edge.second} & narrow], heights)
     lumps = []
     for number in range(int(label.max()) + 1):
         mine = [bases[k] for k in np.flatnonzero(label == number).tolist()]
         with naming(base.number for base in mine):
-            solid = _thicken([base.face for base in mine], mine[0].height)
+            wedge = label.tolist().index(number) in narrow
+            solid = build_wedge(mine[0].face) if wedge else _thicken([base.face for base in mine], mine[0].height)
         lumps.append(Lump(solid, tuple(base.number for base in mine)))
     sharp = [edge for edge in edges if edge.kind == "convex"]
     for edge in sharp:
         numbers = (bases[edge.first].number, bases[edge.second].number)
         with naming(numbers):
-            lumps.append(Lump(build_mitre(edge, heights[edge.first], heights[edge.second]), numbers))
+            lumps.append(Lump(_build_mitre(edge, bases, narrow), numbers))
     return lumps + _build_corners(sharp, bases)
+
+
+def _build_mitre(edge: Edge, bases: Sequence[Base], narrow: set[int]) -> Any:
+    """The stock over a sharp convex edge."""
+    first, second = bases[edge.first], bases[edge.second]
+    if edge.first in narrow and edge.second not in narrow:
+        return build_end(edge.shape, first.face, edge.others, second.height)
+    if edge.second in narrow and edge.first not in narrow:
+        return build_end(edge.shape, second.face, edge.normals, first.height)
+    return build_mitre(edge, first.height, second.height)
+
+
+def _find_narrow(edges: Sequence[Edge], bases: Sequence[Base]) -> set[int]:
+    """Fillets whose radius is less than the stock is high; beyond their axis the stock is that of their neighbours."""
+    smooth = {k for edge in edges if edge.kind == "smooth" for k in (edge.first, edge.second)}
+    return {k for k in smooth if is_narrow(bases[k].face, bases[k].height)}
 
 
 def _group(edges: Sequence[Edge], heights: Sequence[float]) -> Ints:
@@ -105,7 +124,8 @@ def join_stock(parts: Sequence[Lump], bases: Sequence[Base]) -> list[Any]:
     """The union of the parts of the stock on some faces. Raises StockError where OpenCASCADE cannot make it."""
     if len(parts) == 1:
         return [parts[0].solid]
-    apart = all(edge.kind in ("smooth", "convex") for edge in find_edges([base.face for base in bases]))
+    edges = find_edges([base.face for base in bases])
+    apart = all(edge.kind in ("smooth", "convex") for edge in edges) and not _find_narrow(edges, bases)
     with naming(base.number for base in bases):
         chord = min(base.height for base in bases) / CHORDS
         found = sew_all(parts, chord) if apart else None
