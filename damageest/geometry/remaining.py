@@ -12,6 +12,8 @@ from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import BALANCE, subtract_lost, to_manifold, to_solid, unite
 from damageest.geometry.vectors import normalise
 
+OPENED = 1e-4
+"""Share of an opened cavity by which what its opening takes out of the part may differ from it."""
 LIFT = 1e-7
 """By how much the outer faces of what is taken off are lifted off the skin, as a share of the part's diagonal."""
 
@@ -42,7 +44,10 @@ def subtract_from_part(
         for one, opening in zip(lost, known, strict=True)
     ]
     left = whole - unite(taken, origin)
-    if abs(whole.volume() - plain.volume() - left.volume()) > BALANCE * whole.volume():
+    # a cavity and what opens it are two results of Boolean operations, each with rounding errors of its own
+    opened = sum(one.volume for one, opening in zip(lost, known, strict=True) if opening is not None)
+    room = BALANCE * whole.volume() + OPENED * opened
+    if abs(whole.volume() - plain.volume() - left.volume()) > room:
         left = subtract_lost(whole, plain)
     return to_solid(left, origin)
 

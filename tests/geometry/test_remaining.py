@@ -17,6 +17,8 @@ from damageest.geometry.solids import to_manifold, to_solid
 from damageest.stages.allowance.milling import Milling
 from tests.geometry.shapes import ball, box
 
+SHRUNK = 2e-5
+
 
 def find_covered(part: Part, lost: Mesh, left: Mesh) -> float:
     """The share of the opening over which what is left has skin: probes on the outer faces that lie on it."""
@@ -90,6 +92,13 @@ def test_nothing_covers_the_opening_of_a_prepared_cavity() -> None:
     left = subtract_from_part(part, [deposit.cavity], openings=[deposit.opening])
     assert left is not None
     assert left.volume + deposit.cavity.volume == pytest.approx(part.volume, rel=1e-7)
+    assert find_covered(part, deposit.cavity, left) < 0.002
+    # a cavity with rounding errors of its own
+    middle = deposit.cavity.bounds.mean(axis=0)
+    other = Solid(middle + (1 - SHRUNK) * (deposit.cavity.vertices - middle), deposit.cavity.faces)
+    assert abs(other.volume - deposit.cavity.volume) > 1e-7 * part.volume
+    left = subtract_from_part(part, [other], openings=[deposit.opening])
+    assert left is not None
     assert find_covered(part, deposit.cavity, left) < 0.002
 
 
