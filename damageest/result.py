@@ -218,8 +218,8 @@ class Result:
         return as_manifold(_require_solid(self.mesh(what, site), what), self._transform_to(frame))
 
     def as_cadquery(self, what: str, site: int | None = None) -> Any:
-        """A ``cadquery.Shape`` with the faces of the part's CAD file: the part, what is ``undamaged`` of it, or the
-        ``damage`` of a site. In the part's frame and in ``units``.
+        """A ``cadquery.Shape`` with the faces of the part's CAD file: the part, what is ``undamaged`` of it, or
+        the ``damage``, the ``deposit`` or the ``milled`` metal of a site. In the part's frame and in ``units``.
 
         It takes a part from STEP, IGES or BREP, and some seconds for each site. Raises ValueError for another name,
         InputError where the part has no CAD faces, there is no exact form, or no plugin converts to CadQuery.

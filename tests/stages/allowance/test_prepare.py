@@ -10,7 +10,10 @@ from manifold3d import Manifold
 
 from damageest.artefacts import Deposit, Part, Solid
 from damageest.errors import StageError
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.stages.allowance._booleans import drop_crumbs
 from damageest.stages.allowance.milling import Milling
 
 TOLERANCE = 0.1
@@ -93,3 +96,34 @@ def test_a_hole_through_the_part_asks_for_a_direction() -> None:
         prepare(hole)
     _, cavity, _ = prepare(hole, direction=(0.0, 0.0, 1.0), wall_angle=20)
     assert measure_area(cavity, -0.5) > measure_area(cavity, -19.5) > np.pi * 24
+
+
+@pytest.mark.parametrize(
+    "tool",
+    [
+        Manifold.sphere(6, 128).translate((0, 0, -4)),
+        Manifold.sphere(7, 128).translate((29, 3, -2)),  # over an edge
+        Manifold.cube((16, 12, 12), True).rotate((0, 25, 10)).translate((28, 18, -1)),  # over a corner
+    ],
+    ids=["pit", "edge", "corner"],
+)
+def test_what_the_cutter_opens_stands_out_of_the_part_all_round(tool: Any) -> None:
+    """Else the cut that exact solids are made with would end on the skin."""
+    _, _, made = prepare(tool, wall_angle=20, min_radius=1.0)
+    damage, block = as_solid(BLOCK ^ tool), as_solid(BLOCK)
+    skin = damage.faces[~find_inner_faces(damage, Part(block.vertices, block.faces))]
+    assert made.opening is not None
+    depth = -signed_distance(damage.vertices[np.unique(skin)], made.opening)[0]
+    assert depth.min() > 0.02 * TOLERANCE
+
+
+def test_a_cavity_that_is_cut_back_has_no_crumbs() -> None:
+    """Rounding errors of Boolean operations left closed bodies of a millionth of a cubic millimetre in it."""
+    body = Manifold.cube((4, 4, 4), True)
+    crumb = Manifold.cube((1e-3, 1e-3, 1e-3), True).translate((9, 0, 0))
+    void = Manifold.cube((1e-3, 1e-3, 1e-3), True)
+    assert len((body - void + crumb).decompose()) == 3
+    cleaned = drop_crumbs(body - void + crumb, 1e-7 * body.volume())
+    assert len(cleaned.decompose()) == 1
+    assert cleaned.volume() == pytest.approx(64)
+    assert drop_crumbs(body, 1e-7) is body
