@@ -98,20 +98,30 @@ def test_a_hole_through_the_part_asks_for_a_direction() -> None:
     assert measure_area(cavity, -0.5) > measure_area(cavity, -19.5) > np.pi * 24
 
 
+ROD = Manifold.cylinder(60, 10, 10, 96, True)
+CHANNEL = Manifold.cube((60, 40, 20), True) - Manifold.cube((70, 30, 12), True).translate((0, 0, 6))
+
+
+def make_lump(radius: float) -> Any:
+    """A rough lump of some dozen facets."""
+    points = np.random.default_rng(3).normal(size=(60, 3))
+    points *= radius * np.linspace(0.85, 1.15, 60)[:, None] / np.linalg.norm(points, axis=1)[:, None]
+    return Manifold.hull_points(points)
+
+
 @pytest.mark.parametrize(
-    "tool",
-    [
-        Manifold.sphere(6, 128).translate((0, 0, -4)),
-        Manifold.sphere(7, 128).translate((29, 3, -2)),  # over an edge
-        Manifold.cube((16, 12, 12), True).rotate((0, 25, 10)).translate((28, 18, -1)),  # over a corner
-    ],
-    ids=["pit", "edge", "corner"],
+    ("body", "place", "radius"),
+    [(ROD, (7, 4, 27), 6), (CHANNEL, (5, 17, -3), 6), (BLOCK, (29, 3, -2), 6), (BLOCK, (29, 18, -1), 4)],
+    ids=["rod", "channel", "edge", "corner"],
 )
-def test_what_the_cutter_opens_stands_out_of_the_part_all_round(tool: Any) -> None:
-    """Else the cut that exact solids are made with would end on the skin."""
-    _, _, made = prepare(tool, wall_angle=20, min_radius=1.0)
-    damage, block = as_solid(BLOCK ^ tool), as_solid(BLOCK)
-    skin = damage.faces[~find_inner_faces(damage, Part(block.vertices, block.faces))]
+def test_what_the_cutter_opens_stands_out_of_the_part_all_round(
+    body: Any, place: tuple[float, float, float], radius: float
+) -> None:
+    """Else the cut that exact solids are made with would end on the skin, where a lump's corner meets it."""
+    tool = make_lump(radius).translate(place)
+    _, _, made = prepare(tool, body, wall_angle=20, min_radius=0.3)
+    damage, whole = as_solid(body ^ tool), as_solid(body)
+    skin = damage.faces[~find_inner_faces(damage, Part(whole.vertices, whole.faces))]
     assert made.opening is not None
     depth = -signed_distance(damage.vertices[np.unique(skin)], made.opening)[0]
     assert depth.min() > 0.02 * TOLERANCE
