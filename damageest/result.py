@@ -40,7 +40,7 @@ class Site:
     into the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part
     of `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
     unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
-    the DV is an enlarged cavity or a whole body of the part. ``path``: the passes that build up the deposit; None where
+    that is a whole body of the part. ``path``: the passes that build up the deposit; None where
     the job asks for none, or none could be planned.
     """
 

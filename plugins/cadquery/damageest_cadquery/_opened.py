@@ -25,9 +25,9 @@ from damageest_cadquery._split import Origin, Piece, ShapeMap, is_sound, measure
 
 FOUND = -5
 """In origins: (k, FOUND) is face k of the inner damage surface, on metal that is milled off."""
-LOST = 1e-3
-"""Share of the cavity within which the metal to mill off has the volume of cavity without damage volume, by triangles:
-those of a spline differ by some ten-thousandths where other edges bound it."""
+LOST = 0.01
+"""Share of the metal to mill off, and of a tenth of the cavity, within which it has the volume of cavity without damage
+volume, by triangles: those of curved faces differ where other edges bound them."""
 CRUMB = 1e-3
 """Share of the milled metal below which a solid of it is dropped: the inner surfaces of cavity and damage are each as
 near to the mesh's as the checks ask for, so sheets thinner than that lie between them."""
@@ -87,7 +87,7 @@ def find_milled(cavity: Exact, damage: Exact, deposit: Deposit, part: Part, tole
     volume = sum(measure_volume(piece.shape) for piece in pieces)
     # all of it as triangles, whose chords make the same of curved faces
     wanted, whole = _measure_difference(opened, lost, pieces, deposit.cavity.bounds.mean(axis=0), tolerance)
-    if abs(whole + sum(volumes) - volume - wanted) > LOST * deposit.cavity.volume:
+    if abs(whole + sum(volumes) - volume - wanted) > LOST * (wanted + deposit.cavity.volume / 10):
         raise StockError(f"its volume differs by {whole / wanted - 1:+.2%} from cavity without damage volume")
     room = VOLUME * deposit.cavity.volume + part.tessellation_error * _measure_curved(pieces)
     if abs(volume - deposit.milled.volume) > room:

@@ -134,8 +134,8 @@ def _build_spline(chart: Chart, part: Part, spans: int, tolerance: float) -> lis
     vertices = chart.mesh.vertices
     margin = 1.1 * EXTENTS[-1] * tolerance / float(np.ptp(chart.uv, axis=0).max())
     first = fit_parametric_spline(chart.uv, vertices, spans, margin)
-    if not _is_near(first, chart, tolerance):
-        return None
+    if not _is_near(first, chart, tolerance) or not any(trace_regions(chart.outlines, tolerance, 0.0)):
+        return None  # of a chart smaller than the steps of its outline none is left
     uv, beyond = _continue(chart, first, part, tolerance)
     fit = fit_parametric_spline(np.concatenate([chart.uv, uv]), np.concatenate([vertices, beyond]), spans, 0.02)
     if not _is_near(fit, chart, tolerance):
@@ -143,6 +143,8 @@ def _build_spline(chart: Chart, part: Part, spans: int, tolerance: float) -> lis
     best, regions = tolerance / 20, None
     for extent in EXTENTS:
         found = trace_regions(chart.outlines, extent * tolerance)
+        if not any(found):
+            continue
         rim = np.concatenate([walk_outline(loop, tolerance / 2)[0] for loops in found for loop in loops])
         height = float(signed_distance(_evaluate(fit, rim), part)[0].min())
         if height > best:
