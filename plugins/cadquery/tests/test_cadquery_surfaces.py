@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.distance import distance_to_mesh
 from tests.needs import import_for, needs_plugin
 
@@ -258,3 +258,17 @@ def test_a_case_of_the_evaluation_is_exact_and_read_back(tmp_path: Path) -> None
     assert all(row["form"] != "none" for row in rows)
     assert all(row["read_valid"] and row["read_volume"] == pytest.approx(row["volume"], rel=1e-4) for row in rows)
     assert all(row["iou_exact"] > row["iou_mesh"] - 0.01 for row in rows)
+
+
+@pytest.mark.parametrize("outline", [[[0, 0], [0, 9], [9, 9], [9, 0]], [[4, 4], [4.01, 4], [4, 4.01]]])
+def test_a_chart_without_an_outline_gets_no_spline(outline: list[list[float]]) -> None:
+    """As where a folded piece of few triangles is flattened: its outline runs the wrong way round, or has no width."""
+    import trimesh
+    from damageest_cadquery._spline import Chart, build_splines
+
+    points, faces = make_grid(10, 9.0)
+    points[:, 2] = 0.01 * (points[:, 0] - 4.5) ** 2 - 3
+    block = trimesh.creation.box((40, 40, 6))
+    part = Part(np.asarray(block.vertices), np.asarray(block.faces))
+    chart = Chart(Mesh(points, faces), points[:, :2], np.ones(100, bool), [np.array(outline, float)])
+    assert build_splines([chart], part, 8, 0.2) is None
