@@ -174,7 +174,7 @@ def _open_floor(damage: Mesh, skin: Flags, prepare: Prepare, tolerance: float, d
     corner = low - out - 2 * cell
     lowest = _lower_floor(damage, corner, (nx, ny), cell)
     # the column stands out of the part all round, also where steps of the grid or simplification round its walls
-    outside = _lower_round(Mesh(damage.vertices, damage.faces[skin]), corner, (nx, ny), cell)
+    outside = _lower_floor(Mesh(damage.vertices, damage.faces[skin]), corner, (nx, ny), cell, below=True)
     floor = np.minimum(np.minimum(lowest, outside - SIMPLE * tolerance) - prepare.depth, top)
     cone: Any = -_draw_cone(deep / slope, cell, slope) if np.isfinite(slope) else np.zeros((1, 1))
     floor = np.asarray(ndimage.grey_erosion(floor, structure=cone, mode="nearest"))
@@ -215,25 +215,17 @@ def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
     return np.asarray(normalise(total[None])[0])
 
 
-def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:
-    """The lowest place of a mesh in the cell round each node of a grid; infinite where there is none."""
-    fine = halve_edges(mesh, cell / 2).vertices
-    node = np.round((fine[:, :2] - corner) / cell).astype(int)
-    floor = np.full(shape, np.inf)
-    np.minimum.at(floor, (node[:, 0], node[:, 1]), fine[:, 2])
-    return floor
-
-
-def _lower_round(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float) -> Floats:
-    """The lowest place of a mesh in the four cells between nodes that meet in each node of a grid; infinite where there
-    is none. A surface through these heights lies nowhere above the mesh."""
+def _lower_floor(mesh: Mesh, corner: Floats, shape: tuple[int, int], cell: float, below: bool = False) -> Floats:
+    """The lowest place of a mesh in the cell round each node of a grid; infinite where there is none. ``below``: in the
+    four cells between nodes that meet in each node: a surface through these heights lies nowhere above the mesh."""
     fine = halve_edges(mesh, cell / 2)
     places = fine.vertices[list_used(fine.faces)]
-    first = np.floor((places[:, :2] - corner) / cell).astype(int)
+    place = (places[:, :2] - corner) / cell
+    corners = np.array([(0, 0), (0, 1), (1, 0), (1, 1)])
+    nodes = np.floor(place) + corners[:, None] if below else np.round(place)[None]
     floor = np.full(shape, np.inf)
-    for x in (0, 1):
-        for y in (0, 1):
-            np.minimum.at(floor, (first[:, 0] + x, first[:, 1] + y), places[:, 2])
+    for node in nodes:
+        np.minimum.at(floor, tuple(node.astype(int).T), places[:, 2])
     return floor
 
 

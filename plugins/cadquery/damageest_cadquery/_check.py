@@ -169,13 +169,13 @@ def is_plane(face: Any) -> bool:
     return bool(BRepAdaptor_Surface(face).GetType() == GeomAbs_Plane)
 
 
-def measure_area(face: Any) -> float:
-    """The area of a face."""
+def measure_area(face: Any, error: float | None = None) -> float:
+    """The area of a face, within the relative ``error`` where one is given."""
     from OCP.BRepGProp import BRepGProp
     from OCP.GProp import GProp_GProps
 
     sizes = GProp_GProps()
-    BRepGProp.SurfaceProperties_s(face, sizes)
+    BRepGProp.SurfaceProperties_s(face, sizes, *([] if error is None else [error]))
     return float(sizes.Mass())
 
 

@@ -23,6 +23,7 @@ from damageest_cadquery._split import (
     Origin,
     Piece,
     ShapeMap,
+    copy_pieces,
     find_corners,
     is_sound,
     is_watertight,
@@ -69,15 +70,12 @@ def find_deposit(
 
     Raises StockError where there is none that passes the checks.
     """
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
-
     start = time.process_time()
     if not isinstance(deposit, Deposit) or (deposit.stock_volume > 0 and not deposit.heights):
         raise StockError("the allowance does not say how high the stock on each CAD face is")
     if deposit.overlap:
         raise StockError("the stock overlaps the intact skin around the damage")
-    # OpenCASCADE adds curves to the edges that it works with, which what is left of the part shares
-    damage = [replace(piece, shape=BRepBuilderAPI_Copy(piece.shape).Shape()) for piece in damage]
+    damage = copy_pieces(damage)
     heights = dict(deposit.heights)
     numbers = {number for piece in damage for number, _ in piece.origins if heights.get(number, 0.0) > 0}
     with naming(numbers):

@@ -21,7 +21,16 @@ from damageest_cadquery._check import INVALID, VOLUME, is_plane, measure_area
 from damageest_cadquery._exact import Exact, SiteInput
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, combine, explore_faces, settle_edges
-from damageest_cadquery._split import Origin, Piece, ShapeMap, is_sound, measure_volume, note_images, triangulate
+from damageest_cadquery._split import (
+    Origin,
+    Piece,
+    ShapeMap,
+    copy_pieces,
+    is_sound,
+    measure_volume,
+    note_images,
+    triangulate,
+)
 
 FOUND = -5
 """In origins: (k, FOUND) is face k of the inner damage surface, on metal that is milled off."""
@@ -64,7 +73,7 @@ def find_milled(cavity: Exact, damage: Exact, deposit: Deposit, part: Part, tole
     start = time.process_time()
     assert deposit.cavity is not None
     assert deposit.milled is not None
-    opened, lost = _copy(cavity.pieces), _copy(damage.pieces)
+    opened, lost = copy_pieces(cavity.pieces), copy_pieces(damage.pieces)
     algorithm = BRepAlgoAPI_Cut()
     shape = combine(algorithm, [piece.shape for piece in opened], [piece.shape for piece in lost])
     known = ShapeMap()
@@ -93,13 +102,6 @@ def find_milled(cavity: Exact, damage: Exact, deposit: Deposit, part: Part, tole
     if abs(volume - deposit.milled.volume) > room:
         raise StockError(f"its volume differs by {volume / deposit.milled.volume - 1:+.2%}")
     return ExactMilled(pieces, volume, time.process_time() - start)
-
-
-def _copy(pieces: Sequence[Piece]) -> list[Piece]:
-    """OpenCASCADE adds curves to the edges that it works with, which others share."""
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
-
-    return [replace(piece, shape=BRepBuilderAPI_Copy(piece.shape).Shape()) for piece in pieces]
 
 
 def _take(solid: Any, owner: int, known: ShapeMap) -> Piece:

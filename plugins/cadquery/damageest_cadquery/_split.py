@@ -6,7 +6,7 @@ Lengths are OpenCASCADE's. Nothing here runs in parallel, so that equal inputs g
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -38,6 +38,14 @@ class Piece:
     shape: Any
     owner: int
     origins: tuple[Origin, ...]
+
+
+def copy_pieces(pieces: Sequence[Piece]) -> list[Piece]:
+    """The pieces with shapes of their own: OpenCASCADE adds curves to the edges that it works with, which others
+    share."""
+    from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
+
+    return [replace(piece, shape=BRepBuilderAPI_Copy(piece.shape).Shape()) for piece in pieces]
 
 
 def build_flat(vertices: Floats, facets: Sequence[Facet]) -> Tool:

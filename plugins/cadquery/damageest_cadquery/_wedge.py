@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest_cadquery._check import measure_area
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, orient_solid
 from damageest_cadquery._split import is_watertight, measure_volume
@@ -25,7 +26,7 @@ STRAIGHT = 1e-9
 SAMPLES = 33
 """Places along an edge at which its foot on the axis is taken."""
 NEAR = 1e-7
-"""Distance, in radii, within which two places of an axis are one."""
+"""Distance, in radii, within which two places of an axis are one; and the relative error of areas."""
 
 
 def is_narrow(face: Any, height: float) -> bool:
@@ -64,7 +65,7 @@ def build_wedge(face: Any) -> Any:
     maker.SetNonDestructive(True)
     maker.Perform()
     solids = [] if maker.HasErrors() else explore(maker.Shape(), TopAbs_SOLID)
-    wanted = _measure_area(face) * radius / 2
+    wanted = measure_area(face, NEAR) * radius / 2
     if len(solids) != 1 or abs(measure_volume(solids[0]) / wanted - 1) > SAME:
         raise StockError("the stock is higher than the radius of a face, and cannot be ended at its axis")
     if not is_watertight(solids[0], radius / CHORDS):
@@ -162,12 +163,3 @@ def _interpolate(points: Sequence[Any], at: Floats) -> Any:
     maker = GeomAPI_Interpolate(places, parameters, False, 1e-9)
     maker.Perform()
     return maker.Curve()
-
-
-def _measure_area(face: Any) -> float:
-    from OCP.BRepGProp import BRepGProp
-    from OCP.GProp import GProp_GProps
-
-    sizes = GProp_GProps()
-    BRepGProp.SurfaceProperties_s(face, sizes, 1e-7)
-    return float(sizes.Mass())
