@@ -14,13 +14,11 @@ from damageest.geometry.distance import Closest, SurfaceTree, distance_to_mesh, 
 from damageest.geometry.duplicates import list_used
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import BALANCE, subtract_lost, to_arrays, to_manifold, to_solid
-from damageest.stages.allowance._booleans import drop_crumbs, simplify_exactly
+from damageest.stages.allowance._booleans import simplify_exactly
 
 FINE, COARSE, MAX_CELL = 0.5, 0.75, 1.0
 """Edge of a grid cell, in tolerances: for a cut-back of less than two tolerances, for a larger one, and the largest
 one where memory limits the number of cells."""
-CRUMB = 1e-7
-"""Share of the damage volume below which a piece of the cavity is a rounding error."""
 ROUGH = 2.0
 """Largest edge of a grid cell where the surface is fitted afterwards."""
 
@@ -56,7 +54,7 @@ def cut_back(
         if missing <= BALANCE * whole.volume():
             break
     missing, cavity = min(tried, key=lambda item: item[0])
-    solid = to_solid(drop_crumbs(simplify_exactly(cavity, part.diagonal), CRUMB * lost.volume()), origin)
+    solid = to_solid(simplify_exactly(cavity, part.diagonal), origin)
     if solid is None or missing > 1e-3 * lost.volume():
         raise StageError(
             f"the volumes of the cut-back do not add up: {missing:.3g} is lost or counted twice",

@@ -10,6 +10,7 @@ from pydantic import Field
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.stages.allowance import Allowance
+from damageest.stages.allowance._booleans import drop_crumbs
 from damageest.stages.allowance._limits import StockConflict
 from damageest.stages.allowance._prepare import Prepare, open_cavity
 from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarget
@@ -18,6 +19,10 @@ MAX_DUST = 1e-6
 """Share of the stock's volume up to which an overlap is left: it is a rounding error."""
 SLIVERS = 1e-6
 """Share of the damage's skin on a CAD face that may have another height of stock: slivers of cuts."""
+
+CRUMB, SPECK = 1e-7, 1e-2
+"""Share of the damage volume, and of a cube of the tolerance, up to which a piece of the cavity, or of the metal milled
+off, is a rounding error."""
 
 
 class Milling(Allowance):
@@ -72,7 +77,7 @@ class Milling(Allowance):
         to keep free, or where the finished deposit does not keep a guarantee."""
         from manifold3d import Manifold
 
-        from damageest.geometry.solids import subtract_lost, to_manifold
+        from damageest.geometry.solids import subtract_lost, to_manifold, to_solid
         from damageest.geometry.touching import separate_sheets
         from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
         from damageest.stages.allowance._cut_back import cut_back
@@ -88,7 +93,10 @@ class Milling(Allowance):
         cavity, opening = cut_back(damage, part, others, self.inner, tolerance) if self.inner else (damage, None)
         if self.prepare is not None:
             cavity, opening = open_cavity(cavity, part, others, self.prepare, tolerance)
+        crumb = max(CRUMB * damage.volume, SPECK * tolerance**3)
         hole, whole = to_manifold(cavity, origin), to_manifold(part, origin)
+        if cavity is not damage and (cleaned := drop_crumbs(hole, crumb)) is not hole:
+            hole, cavity = cleaned, to_solid(cleaned, origin) or cavity
         left = subtract_lost(whole, hole)
         skin = take_skin(cavity, part, plan, origin)
         reach = plan.max_height + tolerance
@@ -123,7 +131,7 @@ class Milling(Allowance):
             body.vertices,
             body.faces,
             cavity=None if cavity is damage else cavity,
-            milled=None if self.prepare is None or cavity is damage else _subtract(cavity, damage, origin),
+            milled=None if self.prepare is None or cavity is damage else _subtract(cavity, damage, crumb, origin),
             stock_volume=max(body.volume - cavity.volume, 0.0),
             cut_back_volume=max(cavity.volume - damage.volume, 0.0),
             thickness=thickness,
@@ -135,10 +143,10 @@ class Milling(Allowance):
         )
 
 
-def _subtract(cavity: Solid, damage: Solid, origin: Floats) -> Solid | None:
+def _subtract(cavity: Solid, damage: Solid, crumb: float, origin: Floats) -> Solid | None:
     from damageest.geometry.solids import to_manifold, to_solid
 
-    return to_solid(to_manifold(cavity, origin) - to_manifold(damage, origin), origin)
+    return to_solid(drop_crumbs(to_manifold(cavity, origin) - to_manifold(damage, origin), crumb), origin)
 
 
 def _describe_touching(conflicts: list[StockConflict], part: Part) -> list[str]:
