@@ -41,25 +41,27 @@ class Descent:
 
         Most poses that are not free are found straight down the tree; the others go down it wherever a ball is near.
         """
-        levels = self.obstacles.levels
-        low, high = np.full(len(tips), np.inf), np.full(len(tips), np.inf)
+        levels, count = self.obstacles.levels, len(tips)
+        low, high = np.full(count, np.inf), np.full(count, np.inf)
+        tips, axes = np.ascontiguousarray(tips.T), np.ascontiguousarray(axes.T)
         ball = np.flatnonzero(self._counts(levels[0]))
         pairs = np.empty((0, 2), np.int64)
         if not len(ball):
             return low, high, pairs
         self._dive(ball, tips, axes, needed, high)
         pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
-        ball = np.tile(ball, len(tips))[: len(pose)]
+        ball = np.tile(ball, count)[: len(pose)]
         for number, level in enumerate(levels):
             going = high.take(pose) >= needed
             pose, ball = pose[going], ball[going]
             if not len(ball):
                 break
-            own = self._measure_from(level.middle.take(ball, 0), pose, tips, axes)
+            middle = level.middle.take(ball, 1)
+            own = self._measure_from(middle, pose, tips, axes)
             radius = level.radius.take(ball)
             lower = own - radius
             if number == len(levels) - 1:
-                _take_least(high, pose, self._measure_high(own, level.middle.take(ball, 0)))
+                _take_least(high, pose, self._measure_high(own, middle[2]))
                 close = lower < ENOUGH * needed
                 pairs = np.stack([pose[close], level.rank.take(ball[close])], axis=1)
                 open_ = (lower < needed) & (high.take(pose) >= needed)
@@ -92,11 +94,11 @@ class Descent:
             if not 0 < len(pose) <= MOST_PIECES:
                 break
             # the piece in the middle has the middle of the whole; the others lie at its corners
-            outer = ((corners + _sum_corners(corners) / 3) / 2).reshape(-1, 3)
+            outer = np.ascontiguousarray(((corners + _sum_corners(corners) / 3) / 2).reshape(-1, 3).T)
             pieces, radius = np.empty((len(pose), 4)), radius / 2
             pieces[:, :3] = self._measure_from(outer, np.repeat(pose, 3), tips, axes).reshape(-1, 3)
             pieces[:, 3] = own
-            _take_least(high, np.repeat(pose, 3), self._measure_high(pieces[:, :3].ravel(), outer))
+            _take_least(high, np.repeat(pose, 3), self._measure_high(pieces[:, :3].ravel(), outer[2]))
             lower = pieces - radius[:, None]
             is_open = (lower < needed) & (high.take(pose) >= needed)[:, None]
             _take_least(low, np.repeat(pose, 4), np.where(is_open, np.inf, lower).ravel())
@@ -111,28 +113,29 @@ class Descent:
             )
         _take_least(low, pose, own - radius)
 
-    def _measure_high(self, own: Floats, points: Floats) -> Floats:
-        """The distances (K,) of points (K,3) on obstacles, whose signed ones are ``own``; infinite where a point does
-        not count, as what it stands for may lie higher than it does."""
-        return np.where(points[:, 2] > self.floor, np.maximum(own, 0.0), np.inf)
+    def _measure_high(self, own: Floats, height: Floats) -> Floats:
+        """The distances (K,) of points on obstacles, whose signed ones are ``own``; infinite where a point does not
+        count because of its ``height`` (K,), as what it stands for may lie higher than it does."""
+        return np.where(height > self.floor, np.maximum(own, 0.0), np.inf)
 
     def _measure_from(self, points: Floats, pose: Ints, tips: Floats, axes: Floats) -> Floats:
-        """Distances (M,) of points (M,3) from the nozzle at a ``pose`` (M,) each; negative inside."""
-        return measure_points(points, tips.take(pose, 0), axes.take(pose, 0), self.profile, self.endless)
+        """Distances (M,) of points (3,M) from the nozzle at a ``pose`` (M,) each; negative inside."""
+        return measure_points(points, tips.take(pose, 1), axes.take(pose, 1), self.profile, self.endless)
 
     def _dive(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
         """Lowers ``high`` (N,) straight down the tree: from the nearest of the balls ``roots`` (K,) to the nearest that
         they hold, and so on, by a point on the surface in each."""
-        pose = np.arange(len(tips))
-        ball = np.tile(roots, (len(tips), 1))
+        pose = np.arange(len(high))
+        ball = np.tile(roots, (len(high), 1))
         for number, level in enumerate(self.obstacles.levels):
             flat, count = ball.ravel(), ball.shape[1]
-            own = self._measure_from(level.one.take(flat, 0), np.repeat(pose, count), tips, axes)
+            one = level.one.take(flat, 1)
+            own = self._measure_from(one, np.repeat(pose, count), tips, axes)
             own[~self._counts(level, flat)] = np.inf
             found = own.reshape(-1, count)
             most = min(BEAM, count - 1)
             nearest = np.argpartition(found, most, axis=1)[:, : most + 1]
-            value = self._measure_high(own, level.one.take(flat, 0)).reshape(-1, count).min(axis=1)
+            value = self._measure_high(own, one[2]).reshape(-1, count).min(axis=1)
             high[pose] = np.minimum(high[pose], value)
             going = value >= needed
             pose, ball = pose[going], np.take_along_axis(ball, nearest, axis=1)[going]
@@ -169,11 +172,20 @@ def _take_least(least: Floats, pose: Ints, found: Floats) -> None:
 
 
 def measure_points(points: Floats, tips: Floats, axes: Floats, profile: Floats, endless: bool) -> Floats:
-    """Distances (N,) of points (N,3) to the nozzle with its tip at ``tips`` (N,3) and its axis along ``axes`` (N,3);
-    negative inside. ``endless``: its body goes on above its end."""
+    """Distances (N,) of points (3,N) to the nozzle with its tip at ``tips`` (3,N) and its axis along ``axes`` (3,N);
+    negative inside. ``endless``: its body goes on above its end. All three hold places or directions as columns."""
     away = points - tips
-    height = np.einsum("ij,ij->i", away, axes)
-    radius = np.sqrt(np.maximum(np.einsum("ij,ij->i", away, away) - height**2, 0.0))
+    along = away * axes
+    height = along[0]
+    height += along[1]
+    height += along[2]
+    away *= away
+    radius = away[0]
+    radius += away[1]
+    radius += away[2]
+    radius -= height**2
+    np.maximum(radius, 0.0, out=radius)
+    np.sqrt(radius, out=radius)
     return _measure_to_profile(height, radius, profile, endless)
 
 
@@ -181,19 +193,26 @@ def _measure_to_profile(height: Floats, radius: Floats, profile: Floats, endless
     """Distances of points to the surface of a solid of revolution whose ``profile`` (K,2) has height and radius;
     negative inside.
 
-    The profile is that of `Cone`: from the tip upward, never narrower.
+    The profile is that of `Cone`: from the tip upward, never narrower. So it is convex: the distance is the largest of
+    those to the lines of its sides, but where a corner is nearest.
     """
     tip, last = profile[0, 1], profile[-1, 1]
     rise, end = profile[1, 0], np.inf if endless else profile[-1, 0]
-    side = np.array([rise - profile[0, 0], profile[1, 1] - tip])
-    out = radius - tip
-    along = np.clip((height * side[0] + out * side[1]) / (side @ side), 0, 1)
-    found = (height - along * side[0]) ** 2 + (out - along * side[1]) ** 2
-    np.minimum(found, height**2 + np.maximum(out, 0) ** 2, out=found)
-    beside = np.maximum(rise - height, 0) + np.maximum(height - end, 0)
-    np.minimum(found, beside**2 + (radius - last) ** 2, out=found)
+    length = float(np.hypot(rise - profile[0, 0], profile[1, 1] - tip))
+    up, out = float((rise - profile[0, 0]) / length), float((profile[1, 1] - tip) / length)
+    beside, beyond = radius - tip, radius - last
+    along = height * up + beside * out
+    found = np.maximum(beside * up - height * out, beyond)
+    np.maximum(found, -height, out=found)
+    corners = [
+        ((along < 0) & (beside > 0), height, beside),
+        ((along > length) & (height < rise), height - rise, beyond),
+    ]
     if not endless:
-        np.minimum(found, (height - end) ** 2 + np.maximum(radius - last, 0) ** 2, out=found)
-    np.sqrt(found, out=found)
-    inside: Flags = (height > 0) & (height < end) & (radius < last) & (out * side[0] < height * side[1])
-    return np.asarray(np.where(inside, -found, found))
+        above = height - end
+        np.maximum(found, above, out=found)
+        corners.append(((above > 0) & (beyond > 0), above, beyond))
+    for nearest, over, aside in corners:
+        which = np.flatnonzero(nearest)
+        found[which] = np.hypot(over[which], aside[which])
+    return np.asarray(found)

@@ -33,8 +33,9 @@ BITS = 14
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """Balls: ``middle`` (K,3), ``radius`` (K,), ``top`` (K,): the largest height of what they hold, ``rank`` (K,): the
-    least rank of it, and ``one`` (K,3): a point of that rank on the surface that they hold, near the middle."""
+    """Balls: ``middle`` (3,K), ``radius`` (K,), ``top`` (K,): the largest height of what they hold, ``rank`` (K,): the
+    least rank of it, and ``one`` (3,K): a point of that rank on the surface that they hold, near the middle. Places are
+    columns, so that each coordinate is read in one piece."""
 
     middle: Floats
     radius: Floats
@@ -87,10 +88,8 @@ class Obstacles:
         found._trees, found.ranks, found._turn = self._trees, self.ranks, turn @ self._turn
         found._corners = self._corners
         for level in self.levels:
-            middle = level.middle @ turn.T
-            found.levels.append(
-                Level(middle, level.radius, middle[:, 2] + level.radius, level.rank, level.one @ turn.T)
-            )
+            middle = turn @ level.middle
+            found.levels.append(Level(middle, level.radius, middle[2] + level.radius, level.rank, turn @ level.one))
         return found
 
 
@@ -160,16 +159,17 @@ def _make_levels(triangles: Floats, rank: Ints) -> list[Level]:
     """The tree over triangles (F,3,3) in the order of `_fill_balls`, and their ranks (F,)."""
     points = triangles.mean(axis=1)
     radius = np.sqrt(((triangles - points[:, None]) ** 2).sum(axis=2).max(axis=1))
-    levels = [Level(points, radius, triangles[:, :, 2].max(axis=1), rank, points)]
+    rows = np.ascontiguousarray(points.T)
+    levels = [Level(rows, radius, triangles[:, :, 2].max(axis=1), rank, rows)]
     for _ in range(_find_depth(len(points))):
-        own, reach = levels[0].middle.reshape(-1, MEMBERS, 3), levels[0].radius.reshape(-1, MEMBERS)
-        middle = (own.min(axis=1) + own.max(axis=1)) / 2
-        away = np.sqrt(((own - middle[:, None]) ** 2).sum(axis=2)) + reach
-        ones, ranks = levels[0].one.reshape(-1, MEMBERS, 3), levels[0].rank.reshape(-1, MEMBERS)
-        far = ((ones - middle[:, None]) ** 2).sum(axis=2)
+        own, reach = levels[0].middle.reshape(3, -1, MEMBERS), levels[0].radius.reshape(-1, MEMBERS)
+        middle = (own.min(axis=2) + own.max(axis=2)) / 2
+        away = np.sqrt(((own - middle[..., None]) ** 2).sum(axis=0)) + reach
+        ones, ranks = levels[0].one.reshape(3, -1, MEMBERS), levels[0].rank.reshape(-1, MEMBERS)
+        far = ((ones - middle[..., None]) ** 2).sum(axis=0)
         best = np.where(ranks == ranks.min(axis=1)[:, None], far, np.inf).argmin(axis=1)
         top = levels[0].top.reshape(-1, MEMBERS).max(axis=1)
-        one = ones[np.arange(len(ones)), best]
+        one = ones[:, np.arange(len(best)), best]
         levels.insert(0, Level(middle, away.max(axis=1), top, ranks.min(axis=1), one))
     return levels
 

@@ -57,9 +57,9 @@ class Sweeps:
             for first, last, least in zip(low, high, value, strict=True):
                 if least >= needed:
                     found[first : last + 1] = np.maximum(found[first : last + 1], least)
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], (found == -np.inf).astype(int), [0]])))
-        for first, last in zip(edges[::2], edges[1::2], strict=True):
-            found[first:last] = body.measure_poses(points[first:last], axes[first:last], needed)
+        rest = np.flatnonzero(found == -np.inf)
+        if len(rest):
+            found[rest] = body.measure_poses(points[rest], axes[rest], needed)
         open_ = np.flatnonzero(found >= needed)
         if clearance.beam is not None and len(open_):
             found[open_[clearance.find_shaded(points[open_], axes[open_])]] = 0.0
@@ -84,20 +84,21 @@ def bound_sweeps(
     assert near is not None
     assert profile is not None
     wanted = needed + clearance.detail
-    found = np.full(len(points), 2 * wanted)
+    points, axes = np.ascontiguousarray(points.T), np.ascontiguousarray(axes.T)
+    ends = points + clearance.standoff * axes
+    found = np.full(len(shift), 2 * wanted)
     roots = np.flatnonzero(near.levels[0].top > clearance.floor)
-    for start in range(0, len(points), CHUNK):
-        own = np.arange(start, min(start + CHUNK, len(points)))
+    for start in range(0, len(shift), CHUNK):
+        own = np.arange(start, min(start + CHUNK, len(shift)))
         pose, ball = np.repeat(own, len(roots)), np.tile(roots, len(own))
         for number, level in enumerate(near.levels):
             if not len(ball):
                 break
-            middle, radius = level.middle[ball], level.radius[ball]
-            tips = points[pose] + clearance.standoff * axes[pose]
-            away = measure_points(middle, tips, axes[pose], profile, clearance.endless)
+            middle, radius = level.middle.take(ball, 1), level.radius[ball]
+            away = measure_points(middle, ends.take(pose, 1), axes.take(pose, 1), profile, clearance.endless)
             # the place of the nozzle that comes near is as far from the point it works on as the obstacle, and the
             # distance between them
-            far = np.linalg.norm(middle - points[pose], axis=1) + np.maximum(away, 0.0) + radius
+            far = _measure_away(middle, points.take(pose, 1)) + np.maximum(away, 0.0) + radius
             value = away - radius - turn[pose] * far - shift[pose]
             if number == len(near.levels) - 1:
                 np.minimum.at(found, pose, value)
@@ -105,10 +106,10 @@ def bound_sweeps(
             kept = value < wanted
             np.minimum.at(found, pose[~kept], value[~kept])
             # a pose at which a place on an obstacle is too near needs no other
-            which, one = pose[kept], level.one[ball[kept]]
-            surface = measure_points(one, tips[kept], axes[which], profile, clearance.endless)
-            far = np.linalg.norm(one - points[which], axis=1) + np.maximum(surface, 0.0)
-            hit = np.zeros(len(points), bool)
+            which, one = pose[kept], level.one.take(ball[kept], 1)
+            surface = measure_points(one, ends.take(which, 1), axes.take(which, 1), profile, clearance.endless)
+            far = _measure_away(one, points.take(which, 1)) + np.maximum(surface, 0.0)
+            hit = np.zeros(len(shift), bool)
             hit[which[surface - turn[which] * far - shift[which] < wanted]] = True
             found[hit] = -np.inf
             pose, ball = pose[kept][~hit[pose[kept]]], ball[kept][~hit[pose[kept]]]
@@ -117,3 +118,10 @@ def bound_sweeps(
             high = near.levels[number + 1].top[ball] > clearance.floor
             pose, ball = pose[high], ball[high]
     return np.asarray(found - clearance.detail)
+
+
+def _measure_away(places: Floats, points: Floats) -> Floats:
+    """The distances (N,) between places and points, columns of (3,N)."""
+    away = places - points
+    away *= away
+    return np.asarray(np.sqrt(away[0] + away[1] + away[2]))
