@@ -115,15 +115,17 @@ def plan_parts(
     """Plans for the whole body, each for what the ones before have left, with a direction of its own.
 
     With 3 axes there is one plan. With more, the directions of later plans lie within the machine's tilt of the first.
-    Layers along a floor get another plan where the first fills half, and trials in planes reach something of the rest.
+    Layers along a floor get another plan where the first fills half and leaves more than `LITTLE`, and trials in planes
+    reach something of the rest.
     """
     plans = [choose_direction(body, origin, directions, around, process, planner)]
     if process.axes == 3:
         return plans
     within = [one for one in directions if one @ plans[0].frame.direction >= np.cos(process.tilt) - 1e-9]
-    volume, smallest = float(body.volume()), process.bead.width**2 * process.height
+    volume = float(body.volume())
+    least = max((LITTLE if planner is plan_conformal else ENOUGH) * volume, process.bead.width**2 * process.height)
     while len(plans) < MOST_PARTS:
-        if _measure_worth(plans[-1], volume) <= max(ENOUGH * volume, smallest):
+        if _measure_worth(plans[-1], volume) <= least:
             break
         left = plans[-1].missing
         left_local = left.transform(np.hstack([plans[-1].frame.turn.T, np.zeros((3, 1))]))

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.geometry.distance import SurfaceTree, distance_to_mesh, is_inside
+from damageest.geometry.distance import SurfaceTree, distance_to_mesh, signed_distance
 from damageest.geometry.solids import to_arrays
 from damageest.geometry.vectors import normalise
 from damageest_paths.process import Process
@@ -21,6 +21,11 @@ from damageest_paths.process import Process
 STEEPEST, ROUND = np.radians(75.0), np.radians(80.0)
 """Largest angles between the floor's normal and the build direction: where it is flat, and where it is round. What is
 steeper is a wall."""
+LEANING = np.radians(60.0)
+"""The same where no layer follows that."""
+MAIN = 0.1
+"""Share of the area of the largest piece of floor, as seen along the build direction, from which another is followed
+where layers do not follow all."""
 TURNS = 0.2
 """Least standard deviation of the angles of a round piece between both, in shares of the range; 0.29: evenly spread."""
 PROBE = 0.15
@@ -79,10 +84,12 @@ def find_shares(triangles: Floats, places: Floats) -> Floats:
     return np.asarray(share / share.sum(axis=1, keepdims=True))
 
 
-def list_floors(body: Any, metal: Any, process: Process) -> Iterator[Floor]:
+def list_floors(body: Any, metal: Any, process: Process) -> Iterator[tuple[Floor, bool]]:
     """Floors of a deposit, a Manifold in local coordinates, on the metal; none where nothing of it is floor.
 
-    The first goes on where it is round; the other, if that makes a difference, does not.
+    The first goes on where it is round; the second, if that makes a difference, does not. Then come those of large
+    pieces alone, without and with what leans much: scans leave scraps of floor on walls and along the rim. With each,
+    whether its layers may be torn.
     """
     if metal.is_empty():
         return
@@ -95,14 +102,21 @@ def list_floors(body: Any, metal: Any, process: Process) -> Iterator[Floor]:
     middle, deep = mesh.triangles.mean(axis=1), PROBE * min(width, process.height)
     near = np.flatnonzero(sound)
     near = near[distance_to_mesh(middle[near], standing) < deep]
-    on_metal[near] = is_inside(middle[near] + deep * mesh.face_normals[near], standing)
+    if len(near):
+        on_metal[near] = signed_distance(middle[near] + deep * mesh.face_normals[near], standing)[0] < 0
     angle = np.arccos(np.clip(-mesh.cross[:, 2] / np.maximum(2 * area, 1e-300), -1, 1))
     flat = on_metal & (angle < STEEPEST)
     round_ = _find_round(faces, on_metal & ~flat & (angle < ROUND), angle, area)
+    found: list[tuple[Flags, bool]] = []
     for is_floor in (flat | round_, flat) if round_.any() else (flat,):
-        kept = _drop_specks(faces, on_metal, is_floor, area, SPECK * width**2)
+        found.append((_drop_specks(faces, on_metal, is_floor, area, SPECK * width**2), False))
+    for steepest in (STEEPEST, LEANING):
+        kept = _drop_specks(faces, on_metal, on_metal & (angle < steepest), area, SPECK * width**2)
+        kept = _keep_main(faces, kept, area * np.cos(angle))
+        found = [one for one in found if (one[0] != kept).any()] + [(kept, True)]
+    for kept, may_tear in found:
         if kept.any():
-            yield make_floor(vertices, faces[kept][:, ::-1], width)
+            yield make_floor(vertices, faces[kept][:, ::-1], width), may_tear
 
 
 def _find_round(faces: Ints, steep: Flags, angle: Floats, area: Floats) -> Flags:
@@ -159,6 +173,14 @@ def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, sm
             small &= ~border[piece]
         found[small] = not kind
     return found & on_metal
+
+
+def _keep_main(faces: Ints, is_floor: Flags, seen: Floats) -> Flags:
+    """Which of the faces (F,) that are floor lie in its large pieces, as seen along the build direction: ``seen`` (F,)
+    areas."""
+    piece = _label(_find_neighbours(faces), is_floor)
+    total = np.bincount(piece, weights=seen * is_floor)
+    return np.asarray(is_floor & (total >= MAIN * total.max(initial=0.0))[piece])
 
 
 def _find_neighbours(faces: Ints) -> tuple[Ints, Ints]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.cutting import cut_triangles
 from damageest_paths.floor import Floor
 from damageest_paths.process import Process
@@ -19,6 +19,7 @@ CLIFF = np.cos(np.radians(75.0))
 """Cosine of the angle between a sheet's face and the way in which the depth grows, from which it is a cliff."""
 FEW = 0.02
 """Share of a sheet that may be cliffs, or stretched too much."""
+STEPS = "the floor of the cavity has steps, and no even layer goes over them"
 TIGHT = 0.6
 """Least ratio of a length on the sheet to that in the plane: beads are laid as much too close there."""
 
@@ -83,26 +84,61 @@ def _trace_border(faces: Ints) -> list[Ints]:
     return [loop for loop in loops if len(loop) > 2]
 
 
-def list_patches(sheet: Sheet, grid: Grid, reach: Floats, floor: Floor, process: Process) -> list[Patch]:
+class Unrolling(NamedTuple):
+    """The ``patches`` of a sheet, and the area ``torn`` of what is wanted and in none of them."""
+
+    patches: list[Patch]
+    torn: float
+
+
+def list_patches(
+    sheet: Sheet, grid: Grid, reach: Floats, floor: Floor, process: Process, may_tear: bool = False
+) -> Unrolling:
     """The pieces of a sheet round what is wanted of it: where ``reach`` (N,) is negative.
 
-    Raises NotFollowedError where the sheet has cliffs, or cannot be unrolled without beads far too close.
+    Where the sheet has cliffs, or cannot be unrolled without beads far too close, it is torn there with ``may_tear``,
+    else NotFollowedError is raised.
     """
-    width = process.bead.width
-    used = sheet.is_found & (reach < width + max(process.extend))
+    used = sheet.is_found & (reach < process.bead.width + max(process.extend))
     faces = grid.faces[used[grid.faces].all(axis=1)]
     wanted = reach[faces].min(axis=1) < 0
     corners = sheet.points[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     area = np.linalg.norm(cross, axis=1)
     along = np.einsum("fi,fi->f", cross, sheet.upward[faces].sum(axis=1)) / 3
-    if area[wanted & (along < CLIFF * area)].sum() > FEW * area[wanted].sum():
-        raise NotFollowedError("the floor of the cavity has steps, and no even layer goes over them")
-    return [
-        _make_patch(sheet, floor, faces[own], reach, process)
-        for own in _split(faces, len(reach))
-        if (reach[faces[own]] < 0).any()
-    ]
+    cliff, torn = along < CLIFF * area, 0.0
+    if area[wanted & cliff].sum() > FEW * area[wanted].sum():
+        if not may_tear:
+            raise NotFollowedError(STEPS)
+        torn = float(area[wanted & cliff].sum())
+        faces, area = faces[~cliff], area[~cliff]
+    patches, left = _unroll_pieces(sheet, floor, faces, area, reach, 2 if may_tear else 0)
+    return Unrolling(patches, torn + left)
+
+
+def _unroll_pieces(
+    sheet: Sheet, floor: Floor, faces: Ints, area: Floats, reach: Floats, tears: int
+) -> tuple[list[Patch], float]:
+    """The patches of faces (F,3) of a sheet with an ``area`` (F,) each, and the area of those that are wanted and in
+    none. ``tears``: how often what bends too much is taken out at most; NotFollowedError with 0."""
+    patches, torn = [], 0.0
+    for own in _split(faces, len(reach)):
+        matters = reach[faces[own]].min(axis=1) < 0
+        if not matters.any():
+            continue
+        patch, ratio = _make_patch(sheet, floor, faces[own], matters)
+        if patch.tight >= TIGHT:
+            patches.append(patch)
+            continue
+        if not tears:
+            raise NotFollowedError(
+                "the layers bend too much both ways: beads laid side by side would lie far too close"
+            )
+        even = (ratio >= TIGHT) & (tears > 1)
+        rest, left = _unroll_pieces(sheet, floor, faces[own[even]], area[own[even]], reach, tears - 1)
+        patches += rest
+        torn += left + float(area[own][matters & ~even].sum())
+    return patches, torn
 
 
 def _split(faces: Ints, count: int) -> list[Ints]:
@@ -117,15 +153,15 @@ def _split(faces: Ints, count: int) -> list[Ints]:
     return [np.flatnonzero(owner == one) for one in np.unique(owner)]
 
 
-def _make_patch(sheet: Sheet, floor: Floor, faces: Ints, reach: Floats, process: Process) -> Patch:
+def _make_patch(sheet: Sheet, floor: Floor, faces: Ints, matters: Flags) -> tuple[Patch, Floats]:
+    """The patch of faces (F,3), of which those that ``matters`` (F,) says decide how it is scaled; and the least ratio
+    (F,) of lengths on the surface to those in the plane."""
     numbers, own = np.unique(faces, return_inverse=True)
     own = own.reshape(-1, 3)
     unrolled = unroll(sheet.points[numbers], own)
-    matters = reach[faces].min(axis=1) < 0
     stretch = unrolled.stretch[matters]
     largest = float(np.quantile(stretch[:, 0], 1 - FEW / 4))
     tight = float(np.quantile(stretch[:, 1], FEW)) / largest
-    if tight < TIGHT:
-        raise NotFollowedError("the layers bend too much both ways: beads laid side by side would lie far too close")
     places = unrolled.places if abs(largest - 1) < 1e-6 else unrolled.places * largest
-    return Patch(numbers, places, own, SheetTree(sheet, floor, places, own, numbers), tight)
+    patch = Patch(numbers, places, own, SheetTree(sheet, floor, places, own, numbers), tight)
+    return patch, unrolled.stretch[:, 1] / largest

@@ -53,6 +53,18 @@ def stair() -> Loss:
     return cut(BLOCK, tool)
 
 
+def ledge() -> Loss:
+    """A pocket 6 deep with a ledge of 4 by 0.6 on one wall, 2 deep, as scans leave them."""
+    tool = Manifold.cube((18, 12, 12)).translate((-9, -6, -6)) + Manifold.cube((4, 1.6, 12)).translate((-2, 5, -2))
+    return cut(BLOCK, tool)
+
+
+def low_stair() -> Loss:
+    """A pocket whose floor has a step of 2, an eighth of it higher."""
+    tool = Manifold.cube((28, 12, 12)).translate((-16, -6, -4)) + Manifold.cube((4, 12, 12)).translate((12, -6, -2))
+    return cut(BLOCK, tool)
+
+
 def crescent() -> Loss:
     """A shaft about the y axis that is worn on its upper side, by 1 at most: the floor is round up to its border."""
     shaft, left = (_lay(Manifold.cylinder(LONG, 18, 18, 256)).translate((0, 0, z)) for z in (0, -1))
@@ -104,8 +116,7 @@ def prepare(loss: Loss, **options: Any) -> Scene:
     origin = loss.lost.bounds.mean(axis=0)
     body, metal = to_manifold(loss.lost, origin), to_manifold(loss.left, origin)
     process, frame = make_process(**options), make_frame((0.0, 0.0, 1.0), origin)
-    floor = next(list_floors(frame.move(body), frame.move(metal), process), None)
-    assert floor is not None
+    floor = next(list_floors(frame.move(body), frame.move(metal), process))[0]
     return Scene(body, Surroundings(metal, (), Clearance(NOZZLE, 3.0)), frame, floor, process)
 
 

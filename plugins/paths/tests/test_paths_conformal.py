@@ -12,7 +12,21 @@ from damageest_paths.planar import plan_planar
 from damageest_paths.process import Pass, Plan
 from damageest_paths.regions import measure_length
 from manifold3d import Manifold
-from path_cavities import BALL, BORE, DEPTH, bowl, crescent, funnel, groove, pocket, prepare, stair, tip
+from path_cavities import (
+    BALL,
+    BORE,
+    DEPTH,
+    bowl,
+    crescent,
+    funnel,
+    groove,
+    ledge,
+    low_stair,
+    pocket,
+    prepare,
+    stair,
+    tip,
+)
 
 from damageest.artefacts import Floats
 from damageest.geometry.distance import distance_to_edges
@@ -171,6 +185,28 @@ def test_a_floor_with_a_step_is_refused() -> None:
     assert not plan.passes
     assert [why for why in plan.reasons if "steps" in why]
     assert plan.missing_volume == pytest.approx(scene.body.volume())
+
+
+def test_a_scrap_of_floor_on_a_wall_is_not_followed() -> None:
+    """Scans leave such scraps; each made a cliff of the layers, and they were refused."""
+    scene = prepare(ledge())
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    assert len({one.layer for one in plan.passes}) == 6
+    tops = {one.layer: np.ptp(one.points[:, 2]) for one in plan.passes}
+    assert max(tops.values()) < 1e-3
+    assert plan.missing_volume < 0.04 * scene.body.volume()
+
+
+def test_layers_are_torn_at_a_low_step_and_what_has_no_bead_there_is_told() -> None:
+    scene = prepare(low_stair())
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    first = [one.points[:, 2] for one in plan.passes if one.layer == 0]
+    assert {round(float(heights.mean()), 3) for heights in first} == {-1.0, 1.0}
+    assert max(np.ptp(heights) for heights in first) < 1e-3
+    told = sum(volume for why, volume in plan.reasons.items() if "step" in why)
+    assert 0.02 < told / scene.body.volume() < 0.07
+    beads = sum(measure_length(one.points) for one in plan.passes) * scene.process.bead.step * plan.height
+    assert beads + plan.missing_volume > 0.9 * scene.body.volume()
 
 
 def test_no_floor_no_passes() -> None:
