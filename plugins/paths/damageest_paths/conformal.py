@@ -16,7 +16,7 @@ from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import COARSER, Obstacles
 from damageest_paths.order import order_passes
-from damageest_paths.patches import STEPS, NotFollowedError, Patch, list_patches
+from damageest_paths.patches import Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings
 from damageest_paths.process import Pass, Plan, Process, extend_line
 from damageest_paths.regions import cover, measure_length, resample, shift_border
@@ -36,6 +36,8 @@ NO_FLOOR, BESIDE = (
     "no side of it that lies on metal faces the build direction",
     "lies beside or below the floor that the layers follow, or at a step of theirs",
 )
+STEPS = "the floor of the cavity has steps, and no even layer goes over them"
+BENDS = "the layers bend too much both ways: beads laid side by side would lie far too close"
 SPARE = 0.02
 """Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
 SLIVER = 0.05
@@ -45,12 +47,14 @@ GROWN, DEEPER = 0.1, 0.5
 crease of the floor it is farther than one height to the layer below."""
 FIRST = 2.0
 """Layer heights by which the first layer is taken to reach down: to the floor wherever that is."""
-MOST_TORN = 0.2
-"""Share of the layers that may be torn."""
 ROUGH = 0.02
 """Share of a bead's width within which the borders of what has no bead are simplified."""
 THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
+
+
+class NotFollowedError(Exception):
+    """No even layers can follow the floor; the message says why."""
 
 
 def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Process) -> Plan:
@@ -65,12 +69,12 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
     plan = Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
     standing: Sweeps | None = None
-    for floor, may_tear in list_floors(local, metal, process):
+    for floor, torn in list_floors(local, metal, process):
         standing = standing or _gather_metal(metal, frame, around, corners, process)
         thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
         count = max(1, int(np.ceil(thickest / process.height - SPARE)))
         height = min(thickest / count, process.height)
-        work = _Work(local, _crop(metal, corners, process), floor, standing, process, height, may_tear)
+        work = _Work(local, _crop(metal, corners, process), floor, standing, process, height, torn)
         try:
             work.build(count, corners)
             return Plan(frame, height, tuple(work.passes), *work.join_missing())
@@ -98,9 +102,9 @@ def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:
 
 @dataclass(eq=False)
 class _Work:
-    """What is planned of a body. ``near``: the metal round it. ``may_tear``: whether layers may be torn where they have
-    steps or bend too much. ``stack``: triangles of the layers below that are not covered by another. ``missing``: what
-    has no bead, in pieces that hardly overlap; ``volumes``: theirs by reason."""
+    """What is planned of a body. ``near``: the metal round it. ``torn``: share of the layers that may be torn
+    where they have steps or bend too much. ``stack``: triangles of the layers below that are not covered by another.
+    ``missing``: what has no bead, in pieces that hardly overlap; ``volumes``: theirs by reason."""
 
     body: Any
     near: Mesh
@@ -108,7 +112,7 @@ class _Work:
     standing: Sweeps
     process: Process
     height: float
-    may_tear: bool
+    torn: float
     passes: list[Pass] = field(default_factory=list)
     layer: list[Pass] = field(default_factory=list)
     missing: list[Any] = field(default_factory=list)
@@ -144,16 +148,16 @@ class _Work:
         solid = Mesh(*to_arrays(self.body))
         heights = guess_heights(self.floor, grid)
         spacing = 3 * FINE * self.process.bead.width
-        found, torn = [], 0.0
-        most = MOST_TORN * float(self.body.volume()) / self.height
+        found, steps, bends = [], 0.0, 0.0
+        most = self.torn * float(self.body.volume()) / self.height
         for number in range(count):
             sheet = lay_sheet(self.floor, grid, heights, (number + 1) * self.height, self.process, self.height)
             heights = sheet.points[:, 2]
             reach = measure_reach(sheet, solid, self.height, spacing) + THIN * self.height
-            unrolling = list_patches(sheet, grid, reach, self.floor, self.process, self.may_tear)
-            torn += unrolling.torn
-            if torn > most:
-                raise NotFollowedError(STEPS)
+            unrolling = list_patches(sheet, grid, reach, self.floor, self.process)
+            steps, bends = steps + unrolling.steps, bends + unrolling.bends
+            if steps + bends > most:
+                raise NotFollowedError(STEPS if steps > bends else BENDS)
             found.append((sheet, reach, unrolling.patches))
         return found
 

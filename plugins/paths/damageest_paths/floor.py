@@ -26,6 +26,8 @@ LEANING = np.radians(60.0)
 MAIN = 0.1
 """Share of the area of the largest piece of floor, as seen along the build direction, from which another is followed
 where layers do not follow all."""
+TORN, MOST_TORN = 0.02, 0.1
+"""Share of the layers that may be torn at steps of a floor before the next is tried, and at most."""
 TURNS = 0.2
 """Least standard deviation of the angles of a round piece between both, in shares of the range; 0.29: evenly spread."""
 PROBE = 0.15
@@ -84,12 +86,12 @@ def find_shares(triangles: Floats, places: Floats) -> Floats:
     return np.asarray(share / share.sum(axis=1, keepdims=True))
 
 
-def list_floors(body: Any, metal: Any, process: Process) -> Iterator[tuple[Floor, bool]]:
+def list_floors(body: Any, metal: Any, process: Process) -> Iterator[tuple[Floor, float]]:
     """Floors of a deposit, a Manifold in local coordinates, on the metal; none where nothing of it is floor.
 
     The first goes on where it is round; the second, if that makes a difference, does not. Then come those of large
     pieces alone, without and with what leans much: scans leave scraps of floor on walls and along the rim. With each,
-    whether its layers may be torn.
+    the share of its layers that may be torn.
     """
     if metal.is_empty():
         return
@@ -107,16 +109,16 @@ def list_floors(body: Any, metal: Any, process: Process) -> Iterator[tuple[Floor
     angle = np.arccos(np.clip(-mesh.cross[:, 2] / np.maximum(2 * area, 1e-300), -1, 1))
     flat = on_metal & (angle < STEEPEST)
     round_ = _find_round(faces, on_metal & ~flat & (angle < ROUND), angle, area)
-    found: list[tuple[Flags, bool]] = []
+    found: list[tuple[Flags, float]] = []
     for is_floor in (flat | round_, flat) if round_.any() else (flat,):
-        found.append((_drop_specks(faces, on_metal, is_floor, area, SPECK * width**2), False))
+        found.append((_drop_specks(faces, on_metal, is_floor, area, SPECK * width**2), TORN))
     for steepest in (STEEPEST, LEANING):
         kept = _drop_specks(faces, on_metal, on_metal & (angle < steepest), area, SPECK * width**2)
         kept = _keep_main(faces, kept, area * np.cos(angle))
-        found = [one for one in found if (one[0] != kept).any()] + [(kept, True)]
-    for kept, may_tear in found:
+        found = [one for one in found if (one[0] != kept).any()] + [(kept, MOST_TORN)]
+    for kept, torn in found:
         if kept.any():
-            yield make_floor(vertices, faces[kept][:, ::-1], width), may_tear
+            yield make_floor(vertices, faces[kept][:, ::-1], width), torn
 
 
 def _find_round(faces: Ints, steep: Flags, angle: Floats, area: Floats) -> Flags:

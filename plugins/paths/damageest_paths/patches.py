@@ -19,13 +19,8 @@ CLIFF = np.cos(np.radians(75.0))
 """Cosine of the angle between a sheet's face and the way in which the depth grows, from which it is a cliff."""
 FEW = 0.02
 """Share of a sheet that may be cliffs, or stretched too much."""
-STEPS = "the floor of the cavity has steps, and no even layer goes over them"
 TIGHT = 0.6
 """Least ratio of a length on the sheet to that in the plane: beads are laid as much too close there."""
-
-
-class NotFollowedError(Exception):
-    """No even layers can follow the floor; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,42 +80,37 @@ def _trace_border(faces: Ints) -> list[Ints]:
 
 
 class Unrolling(NamedTuple):
-    """The ``patches`` of a sheet, and the area ``torn`` of what is wanted and in none of them."""
+    """The ``patches`` of a sheet, and the areas of what is wanted and in none of them: at ``steps``, and where it
+    ``bends`` both ways so much that beads would lie far too close."""
 
     patches: list[Patch]
-    torn: float
+    steps: float
+    bends: float
 
 
-def list_patches(
-    sheet: Sheet, grid: Grid, reach: Floats, floor: Floor, process: Process, may_tear: bool = False
-) -> Unrolling:
-    """The pieces of a sheet round what is wanted of it: where ``reach`` (N,) is negative.
-
-    Where the sheet has cliffs, or cannot be unrolled without beads far too close, it is torn there with ``may_tear``,
-    else NotFollowedError is raised.
-    """
+def list_patches(sheet: Sheet, grid: Grid, reach: Floats, floor: Floor, process: Process) -> Unrolling:
+    """The pieces of a sheet round what is wanted of it: where ``reach`` (N,) is negative. It is torn at cliffs, and
+    where it cannot be unrolled without beads far too close, if that is more than `FEW` of it."""
     used = sheet.is_found & (reach < process.bead.width + max(process.extend))
     faces = grid.faces[used[grid.faces].all(axis=1)]
     wanted = reach[faces].min(axis=1) < 0
     corners = sheet.points[faces]
     cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(cross, axis=1)
-    along = np.einsum("fi,fi->f", cross, sheet.upward[faces].sum(axis=1)) / 3
-    cliff, torn = along < CLIFF * area, 0.0
+    area = np.linalg.norm(cross, axis=1) / 2
+    along = np.einsum("fi,fi->f", cross, sheet.upward[faces].sum(axis=1)) / 6
+    cliff, steps = along < CLIFF * area, 0.0
     if area[wanted & cliff].sum() > FEW * area[wanted].sum():
-        if not may_tear:
-            raise NotFollowedError(STEPS)
-        torn = float(area[wanted & cliff].sum())
+        steps = float(area[wanted & cliff].sum())
         faces, area = faces[~cliff], area[~cliff]
-    patches, left = _unroll_pieces(sheet, floor, faces, area, reach, 2 if may_tear else 0)
-    return Unrolling(patches, torn + left)
+    patches, bends = _unroll_pieces(sheet, floor, faces, area, reach, 2)
+    return Unrolling(patches, steps, bends)
 
 
 def _unroll_pieces(
-    sheet: Sheet, floor: Floor, faces: Ints, area: Floats, reach: Floats, tears: int
+    sheet: Sheet, floor: Floor, faces: Ints, area: Floats, reach: Floats, times: int
 ) -> tuple[list[Patch], float]:
     """The patches of faces (F,3) of a sheet with an ``area`` (F,) each, and the area of those that are wanted and in
-    none. ``tears``: how often what bends too much is taken out at most; NotFollowedError with 0."""
+    none. ``times``: how often what bends too much is taken out before the rest is given up."""
     patches, torn = [], 0.0
     for own in _split(faces, len(reach)):
         matters = reach[faces[own]].min(axis=1) < 0
@@ -130,12 +120,8 @@ def _unroll_pieces(
         if patch.tight >= TIGHT:
             patches.append(patch)
             continue
-        if not tears:
-            raise NotFollowedError(
-                "the layers bend too much both ways: beads laid side by side would lie far too close"
-            )
-        even = (ratio >= TIGHT) & (tears > 1)
-        rest, left = _unroll_pieces(sheet, floor, faces[own[even]], area[own[even]], reach, tears - 1)
+        even = (ratio >= TIGHT) & (times > 1)
+        rest, left = _unroll_pieces(sheet, floor, faces[own[even]], area[own[even]], reach, times - 1)
         patches += rest
         torn += left + float(area[own][matters & ~even].sum())
     return patches, torn
