@@ -169,7 +169,8 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
 
     The sign is that of the angle-weighted pseudonormal (Baerentzen and Aanaes 2005), exact on a clean watertight mesh.
     Where the nearest place lies on an edge or corner of a flat or slender triangle, or on a vertex that exists twice,
-    as CAD tessellations have, the pseudonormal is unreliable and the winding number gives the sign instead.
+    as CAD tessellations have, or where the mesh folds back on itself, the pseudonormal is unreliable and the winding
+    number gives the sign instead.
 
     Raises ValueError where the mesh has no triangle with an area.
     """
@@ -197,7 +198,8 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
         # that of plain distances is the same where no triangle is left out
         return build_tree(vertices, faces) if flat.any() else keep_tree(mesh).tree
 
-    signed, nearest, foot, pseudo = keep_signed_mesh(mesh, vertices, faces, find_tree).measure(query)
+    kept = keep_signed_mesh(mesh, vertices, faces, find_tree)
+    signed, nearest, foot, pseudo = kept.measure(query)
     away = query - foot
     normal = normalise(mesh.cross[used[nearest]])
     beside = np.linalg.norm(np.cross(away, normal), axis=1) > 1e-7 * np.abs(signed)
@@ -205,6 +207,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     # face and not the pseudonormal of the edge: 4 of 70,000 points around a tube with a hole, millimetres from the
     # surface, had the wrong sign.
     doubtful = beside & (np.einsum("ij,ij->i", pseudo, normal) > (1 - 1e-9) * np.linalg.norm(pseudo, axis=1))
+    doubtful |= kept.folded[nearest]  # beside a fold also faces, which may be turned inside out
     if unreliable.any():
         doubtful |= beside & unreliable[faces[nearest]].any(axis=1)
     if doubtful.any():

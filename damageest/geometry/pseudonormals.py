@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.long_faces import Tree
 from damageest.geometry.threads import cut_evenly
 
@@ -22,6 +22,10 @@ CHUNK = 10_000
 
 ON_EDGE = 1e-12
 """Barycentric coordinate up to which a place lies on the opposite edge, as libigl takes it."""
+
+FOLDED, SHARP = 0.1, 0.45
+"""Where the mesh folds back: the cosine of the angle between the normals of a vertex and of a face there is less than
+that; the sum of the normals of two faces is shorter than this, so that their edge is sharper than 26 degrees."""
 
 _last: WeakKeyDictionary[Mesh, SignedMesh] = WeakKeyDictionary()
 """The mesh that was asked last: more would hold memory that the next stages need."""
@@ -54,6 +58,17 @@ class SignedMesh:
             of_edge,
             np.stack([np.ravel(opposite)[k * count : (k + 1) * count] for k in range(3)], 1),
         )
+
+    @cached_property
+    def folded(self) -> Flags:
+        """Whether each face (F,) has an edge or a vertex at which the mesh folds back on itself. Where it crosses
+        itself there, as damage volumes do in a few places, far points would get the wrong side."""
+        of_face, of_vertex, of_edge, opposite = self._normals
+        against = np.einsum("fi,fki->fk", of_face, of_vertex[self.faces]) < FOLDED
+        vertex = np.zeros(len(self.vertices), bool)
+        vertex[self.faces[against]] = True
+        sharp = (np.linalg.norm(of_edge, axis=1) < SHARP)[opposite].any(axis=1)
+        return np.asarray(vertex[self.faces].any(axis=1) | sharp)
 
     def measure(self, points: Floats) -> tuple[Floats, Ints, Floats, Floats]:
         """Signed distance (N,) of points (N,3), positive outside, the nearest face (N,), the nearest place (N,3) and

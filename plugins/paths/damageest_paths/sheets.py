@@ -27,6 +27,8 @@ SAMPLES = 9
 """Places between the top and the bottom of a layer at which it is looked for the deposit."""
 UNDER = 0.25
 """Share of the layer height by which metal may lie deeper than the layer's bottom and still hold it."""
+NEAR = 0.5
+"""Share of an edge of a sheet's triangles by which a place between its points is moved at most to have its depth."""
 STEEP = 0.15
 """Cosine of the steepest angle at which a column is followed."""
 
@@ -168,11 +170,14 @@ class SheetTree:
         self.points, self.normals = sheet.points[numbers], sheet.normals[numbers]
         self.upward = sheet.upward[numbers]
         self.tree = SurfaceTree(Mesh(np.column_stack([places, np.zeros(len(places))]), faces))
+        sides = places[faces[:, 1]] - places[faces[:, 0]]
+        self.farthest = NEAR * float(np.linalg.norm(sides, axis=1).mean())
 
     def find(self, places: Floats, exact: bool = True) -> tuple[Floats, Floats, Floats]:
         """Points (N,3) at places (N,2) of the plane, their smoothed normals (N,3), and where the depth grows (N,3).
 
-        ``exact``: whether the points have the sheet's depth, or are only on the triangles between its points.
+        ``exact``: whether the points have the sheet's depth, or are only on the triangles between its points; so they
+        are where that is far from the sheet's depth, as over a place at which two sides of the floor are as near.
         """
         from damageest_paths.floor import find_shares
 
@@ -186,5 +191,6 @@ class SheetTree:
         upward = normalise(upward)
         if exact:
             distance, upward = self.floor.measure(points)
-            points = points + (self.sheet.depth - distance)[:, None] * upward
+            off = self.sheet.depth - distance
+            points = points + np.where(np.abs(off) <= self.farthest, off, 0.0)[:, None] * upward
         return points, normals, upward
