@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 from damageest_paths.conformal import plan_conformal
+from damageest_paths.floor import Depth, Floor
 from damageest_paths.planar import plan_planar
 from damageest_paths.process import Pass, Plan
 from damageest_paths.regions import measure_length
+from damageest_paths.sheets import Sheet, SheetTree
 from manifold3d import Manifold
 from path_cavities import (
     BALL,
@@ -223,3 +225,22 @@ def test_the_same_twice() -> None:
     )
     assert [one.points.tobytes() for one in first.passes] == [one.points.tobytes() for one in second.passes]
     assert [one.axes.tobytes() for one in first.passes] == [one.axes.tobytes() for one in second.passes]
+
+
+def test_a_place_far_from_the_depth_of_its_sheet_stays_between_its_neighbours() -> None:
+    """Over a place at which two sides of the floor are as near, the depth jumps: passes were laid 1.5 mm off there."""
+    x, y = np.meshgrid(np.arange(5.0), np.arange(5.0), indexing="ij")
+    places = np.column_stack([x.ravel(), y.ravel()])
+    number = np.arange(25).reshape(5, 5)
+    a, b, c, d = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    faces = np.concatenate([np.stack(one, axis=-1).reshape(-1, 3) for one in ((a, b, c), (a, c, d))])
+    points, up = np.column_stack([places, np.full(25, 1.1)]), np.tile([0.0, 0.0, 1.0], (25, 1))
+
+    class Jump:
+        def measure(self, at: Floats) -> Depth:
+            return Depth(np.where(at[:, 0] > 2, at[:, 2] + 3, at[:, 2]), np.tile([0.0, 0.0, 1.0], (len(at), 1)))
+
+    sheet = Sheet(1.0, points, up, up, np.ones(25, bool))
+    tree = SheetTree(sheet, cast(Floor, Jump()), places, faces, np.arange(25))
+    found = tree.find(np.array([[1.5, 1.5], [2.5, 1.5]]))[0]
+    assert found[:, 2] == pytest.approx([1.0, 1.1])
