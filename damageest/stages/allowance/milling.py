@@ -121,6 +121,9 @@ class Milling(Allowance):
         thickness = check_deposit(
             DepositGeometry(deposit, hole, stock, left, barred, skin, band, origin), part, tolerance, conflicts
         )
+        milled: Solid | None = None
+        if self.prepare is not None and cavity is not damage:
+            milled = to_solid(drop_crumbs(hole - to_manifold(damage, origin), crumb), origin)
         body = separate_sheets(deposit, origin, tolerance)
         if body is None:
             raise StageError("the deposit is empty", "use a slightly different outer")
@@ -131,7 +134,7 @@ class Milling(Allowance):
             body.vertices,
             body.faces,
             cavity=None if cavity is damage else cavity,
-            milled=None if self.prepare is None or cavity is damage else _subtract(cavity, damage, crumb, origin),
+            milled=milled,
             stock_volume=max(body.volume - cavity.volume, 0.0),
             cut_back_volume=max(cavity.volume - damage.volume, 0.0),
             thickness=thickness,
@@ -141,12 +144,6 @@ class Milling(Allowance):
             notes=tuple(notes),
             opening=opening,
         )
-
-
-def _subtract(cavity: Solid, damage: Solid, crumb: float, origin: Floats) -> Solid | None:
-    from damageest.geometry.solids import to_manifold, to_solid
-
-    return to_solid(drop_crumbs(to_manifold(cavity, origin) - to_manifold(damage, origin), crumb), origin)
 
 
 def _describe_touching(conflicts: list[StockConflict], part: Part) -> list[str]:

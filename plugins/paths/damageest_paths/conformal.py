@@ -68,13 +68,14 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
     local, metal = frame.move(body), frame.move(around.metal)
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
     plan = Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
+    places, near = to_arrays(local.refine_to_length(process.bead.width))[0], _crop(metal, corners, process)
     standing: Sweeps | None = None
     for floor, torn in list_floors(local, metal, process):
         standing = standing or _gather_metal(metal, frame, around, corners, process)
-        thickest = float(floor.measure(to_arrays(local.refine_to_length(process.bead.width))[0]).distance.max())
+        thickest = float(floor.measure(places).distance.max())
         count = max(1, int(np.ceil(thickest / process.height - SPARE)))
         height = min(thickest / count, process.height)
-        work = _Work(local, _crop(metal, corners, process), floor, standing, process, height, torn)
+        work = _Work(local, near, floor, standing, process, height, torn)
         try:
             work.build(count, corners)
             return Plan(frame, height, tuple(work.passes), *work.join_missing())

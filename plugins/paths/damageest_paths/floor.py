@@ -108,22 +108,26 @@ def list_floors(body: Any, metal: Any, process: Process) -> Iterator[tuple[Floor
         on_metal[near] = signed_distance(middle[near] + deep * mesh.face_normals[near], standing)[0] < 0
     angle = np.arccos(np.clip(-mesh.cross[:, 2] / np.maximum(2 * area, 1e-300), -1, 1))
     flat = on_metal & (angle < STEEPEST)
-    round_ = _find_round(faces, on_metal & ~flat & (angle < ROUND), angle, area)
-    found: list[tuple[Flags, float]] = []
-    for is_floor in (flat | round_, flat) if round_.any() else (flat,):
-        found.append((_drop_specks(faces, on_metal, is_floor, area, SPECK * width**2), TORN))
-    for steepest in (STEEPEST, LEANING):
-        kept = _drop_specks(faces, on_metal, on_metal & (angle < steepest), area, SPECK * width**2)
-        kept = _keep_main(faces, kept, area * np.cos(angle))
-        found = [one for one in found if (one[0] != kept).any()] + [(kept, MOST_TORN)]
+    pairs = _find_neighbours(faces)
+
+    def drop_specks(is_floor: Flags) -> Flags:
+        return _drop_specks(pairs, on_metal, is_floor, area, SPECK * width**2)
+
+    round_ = _find_round(pairs, on_metal & ~flat & (angle < ROUND), angle, area)
+    level = drop_specks(flat)
+    found = [(drop_specks(flat | round_), TORN), (level, TORN)] if round_.any() else [(level, TORN)]
+    for kept in (level, drop_specks(flat & (angle < LEANING))):
+        main = _keep_main(pairs, kept, area * np.cos(angle))
+        found = [one for one in found if (one[0] != main).any()] + [(main, MOST_TORN)]
     for kept, torn in found:
         if kept.any():
             yield make_floor(vertices, faces[kept][:, ::-1], width), torn
 
 
-def _find_round(faces: Ints, steep: Flags, angle: Floats, area: Floats) -> Flags:
-    """Which of the ``steep`` faces (F,) lie in pieces that are round: a wall that leans has one angle."""
-    piece = _label(_find_neighbours(faces), steep)
+def _find_round(pairs: tuple[Ints, Ints], steep: Flags, angle: Floats, area: Floats) -> Flags:
+    """Which of the ``steep`` faces (F,) lie in pieces that are round: a wall that leans has one angle. ``pairs``: as of
+    `_find_neighbours`."""
+    piece = _label(pairs, steep)
     weight = area * steep
     total = np.maximum(np.bincount(piece, weights=weight), 1e-300)
     mean = np.bincount(piece, weights=weight * angle) / total
@@ -160,9 +164,8 @@ def _find_normals(mesh: Mesh, on_rim: Flags, radius: float) -> Floats:
     return normalise(normals)
 
 
-def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, smallest: float) -> Flags:
+def _drop_specks(pairs: tuple[Ints, Ints], on_metal: Flags, is_floor: Flags, area: Floats, smallest: float) -> Flags:
     """Whether each face (F,) is floor, where small pieces of wall, and of floor, are like what is round them."""
-    pairs = _find_neighbours(faces)
     first, second = pairs
     found = is_floor.copy()
     for kind in (True, False):
@@ -170,17 +173,17 @@ def _drop_specks(faces: Ints, on_metal: Flags, is_floor: Flags, area: Floats, sm
         piece = _label(pairs, mine)
         small = mine & (np.bincount(piece, weights=area * mine)[piece] < smallest)
         if not kind:  # not where it is on the border
-            border = np.zeros(len(faces), bool)
+            border = np.zeros(len(found), bool)
             border[piece[np.concatenate([first[~on_metal[second]], second[~on_metal[first]]])]] = True
             small &= ~border[piece]
         found[small] = not kind
     return found & on_metal
 
 
-def _keep_main(faces: Ints, is_floor: Flags, seen: Floats) -> Flags:
+def _keep_main(pairs: tuple[Ints, Ints], is_floor: Flags, seen: Floats) -> Flags:
     """Which of the faces (F,) that are floor lie in its large pieces, as seen along the build direction: ``seen`` (F,)
     areas."""
-    piece = _label(_find_neighbours(faces), is_floor)
+    piece = _label(pairs, is_floor)
     total = np.bincount(piece, weights=seen * is_floor)
     return np.asarray(is_floor & (total >= MAIN * total.max(initial=0.0))[piece])
 

@@ -98,7 +98,7 @@ def bound_sweeps(
             away = measure_points(middle, ends.take(pose, 1), axes.take(pose, 1), profile, clearance.endless)
             # the place of the nozzle that comes near is as far from the point it works on as the obstacle, and the
             # distance between them
-            far = _measure_away(middle, points.take(pose, 1)) + np.maximum(away, 0.0) + radius
+            far = np.linalg.norm(middle - points.take(pose, 1), axis=0) + np.maximum(away, 0.0) + radius
             value = away - radius - turn[pose] * far - shift[pose]
             if number == len(near.levels) - 1:
                 np.minimum.at(found, pose, value)
@@ -108,7 +108,7 @@ def bound_sweeps(
             # a pose at which a place on an obstacle is too near needs no other
             which, one = pose[kept], level.one.take(ball[kept], 1)
             surface = measure_points(one, ends.take(which, 1), axes.take(which, 1), profile, clearance.endless)
-            far = _measure_away(one, points.take(which, 1)) + np.maximum(surface, 0.0)
+            far = np.linalg.norm(one - points.take(which, 1), axis=0) + np.maximum(surface, 0.0)
             hit = np.zeros(len(shift), bool)
             hit[which[surface - turn[which] * far - shift[which] < wanted]] = True
             found[hit] = -np.inf
@@ -118,10 +118,3 @@ def bound_sweeps(
             high = near.levels[number + 1].top[ball] > clearance.floor
             pose, ball = pose[high], ball[high]
     return np.asarray(found - clearance.detail)
-
-
-def _measure_away(places: Floats, points: Floats) -> Floats:
-    """The distances (N,) between places and points, columns of (3,N)."""
-    away = places - points
-    away *= away
-    return np.asarray(np.sqrt(away[0] + away[1] + away[2]))
