@@ -6,7 +6,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from damageest.geometry.solids import compose_shells
+from damageest.artefacts import Floats, Solid
+from damageest.geometry.solids import compose_shells, to_manifold, to_solid
 
 SLACK = 1e-5
 """Largest accepted change of a solid's volume, as a share of it; a tenth of what the check of a deposit accepts."""
@@ -33,12 +34,12 @@ def keep_touching(stock: Any, filled: Any, tolerance: float) -> Any:
     return compose_shells(pieces)
 
 
-def drop_crumbs(body: Any, least: float) -> Any:
-    """A Manifold without the pieces, and the voids in it, of at most ``least`` in volume: rounding errors of a Boolean
-    operation."""
-    pieces = body.decompose()
+def drop_crumbs(solid: Solid, origin: Floats, least: float) -> Solid:
+    """A solid without the pieces, and the voids in it, of at most ``least`` in volume: rounding errors of a Boolean
+    operation. Those that touch another piece at a vertex are pieces too, as they are to whoever reads its file."""
+    pieces = to_manifold(solid, origin).decompose()
     kept = [piece for piece in pieces if abs(piece.volume()) > least]
-    return body if len(kept) == len(pieces) else compose_shells(kept)
+    return solid if len(kept) == len(pieces) else to_solid(compose_shells(kept), origin) or solid
 
 
 def join(filled: Any, stock: Any) -> Any:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 from typing import Any, Literal
 
 import numpy as np
@@ -14,7 +15,7 @@ from damageest.geometry.duplicates import list_used
 from damageest.geometry.rays import prepare_rays
 from damageest.geometry.refinement import halve_edges
 from damageest.geometry.skin import find_inner_faces
-from damageest.geometry.solids import to_manifold, to_solid
+from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.geometry.transforms import turn_to_axis
 from damageest.geometry.vectors import normalise
 from damageest.options import Options
@@ -33,6 +34,8 @@ SIMPLE = 1 / 8
 """Tolerances by which the surface of the opened cavity is simplified."""
 CLEAR = 2.0
 """Tolerances by which what the cutter opens goes on above the damage where there is no metal."""
+TOUCHING = 1e-3
+"""Tolerances between damage and a piece of metal up to which they touch."""
 CRUMB = 1e-9
 """Share of the damage volume below which metal to mill off is rounding."""
 
@@ -101,6 +104,21 @@ class _Column:
         # what is only as high as the roof's plate is no opening
         return body.trim_by_plane((0.0, 0.0, -1.0), -self.top)
 
+    def close_below(self, aside: list[Any], kept: list[Any], turn: Floats) -> _Column:
+        """The column without what takes out the bodies ``aside``, except where the bodies ``kept`` lie below or above
+        them: Manifolds, which ``turn`` (3,3) turns to the frame of the column."""
+        from scipy import ndimage
+
+        def find_nodes(body: Any, cells: int) -> Flags:
+            vertices, faces = to_arrays(body)
+            found = np.isfinite(_lower_floor(Mesh(vertices @ turn.T, faces), self.corner, self.floor.shape, self.cell))
+            return np.asarray(ndimage.binary_dilation(found, iterations=cells))
+
+        below, used = (
+            np.any([find_nodes(each, far) for each in some], axis=0) for some, far in ((aside, 2), (kept, 1))
+        )
+        return replace(self, floor=np.where(below & ~used, self.top, self.floor))
+
 
 def open_cavity(
     damage: Solid, part: Part, others: Solid | None, prepare: Prepare, tolerance: float
@@ -119,12 +137,18 @@ def open_cavity(
     direction = _find_direction(damage, part, prepare)
     origin, turn = damage.bounds.mean(axis=0), turn_to_axis(direction).T
     turned = Mesh((damage.vertices - origin) @ turn.T, damage.faces)
-    room = _raise_room(turned, ~find_inner_faces(damage, part), part, origin, turn, prepare, tolerance)
-    room = room.simplify(SIMPLE * tolerance).transform(np.column_stack([turn.T, np.zeros(3)]))
+    column = _find_column(turned, ~find_inner_faces(damage, part), part, origin, turn, prepare, tolerance)
     whole, lost = to_manifold(part, origin), to_manifold(damage, origin)
-    # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
-    opening = room + lost
-    opened = whole ^ opening
+
+    def cut(one: _Column) -> tuple[Any, Any]:
+        room = one.raise_body().simplify(SIMPLE * tolerance).transform(np.column_stack([turn.T, np.zeros(3)]))
+        # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
+        return room + lost, whole ^ (room + lost)
+
+    opening, opened = cut(column)
+    kept, aside = _tell_apart(opened, lost, tolerance)
+    if aside:
+        opening, opened = cut(column.close_below(aside, kept, turn))
     if others is not None:
         opened = (opened - to_manifold(others, origin)) + lost
     if opened.volume() - lost.volume() <= CRUMB * damage.volume:
@@ -135,12 +159,18 @@ def open_cavity(
     return cavity, to_solid(opening, origin)
 
 
-def _raise_room(
+def _tell_apart(opened: Any, lost: Any, tolerance: float) -> tuple[list[Any], list[Any]]:
+    """The pieces of a Manifold that touch ``lost``, and those that do not."""
+    pieces = [each for each in opened.decompose() if each.volume() > 0]
+    touch = [each.min_gap(lost, tolerance) <= TOUCHING * tolerance for each in pieces]
+    return list(compress(pieces, touch)), list(compress(pieces, np.logical_not(touch)))
+
+
+def _find_column(
     damage: Mesh, skin: Flags, part: Part, origin: Floats, turn: Floats, prepare: Prepare, tolerance: float
-) -> Any:
-    """The column over the floor of the opened cavity, a Manifold, with z along the direction as the damage, of which
-    the faces ``skin`` (F,) lie on that of the part; ``origin`` (3,) and ``turn`` (3,3): where that frame lies in the
-    part's."""
+) -> _Column:
+    """The column over the floor of the opened cavity, with z along the direction as the damage, of which the faces
+    ``skin`` (F,) lie on that of the part; ``origin`` (3,) and ``turn`` (3,3): where that frame lies in the part's."""
     high, deep = float(damage.bounds[1, 2]), float(np.ptp(damage.bounds[:, 2])) + prepare.depth
     top, limit = high + tolerance / 4, high + deep
 
@@ -157,7 +187,7 @@ def _raise_room(
         higher = _open_floor(damage, skin, prepare, tolerance, deep + limit - top, limit)
         if np.isfinite(measure(higher)).all():
             column = higher
-    return column.raise_body()
+    return column
 
 
 def _open_floor(damage: Mesh, skin: Flags, prepare: Prepare, tolerance: float, deep: float, top: float) -> _Column:

@@ -21,8 +21,8 @@ SLIVERS = 1e-6
 """Share of the damage's skin on a CAD face that may have another height of stock: slivers of cuts."""
 
 CRUMB, SPECK = 1e-7, 1e-2
-"""Share of the damage volume, and of a cube of the tolerance, up to which a piece of the cavity, or of the metal milled
-off, is a rounding error."""
+"""Share of the damage volume, and of a cube of the tolerance, up to which a piece of the cavity, of the metal milled
+off or of the deposit is a rounding error."""
 
 
 class Milling(Allowance):
@@ -77,7 +77,7 @@ class Milling(Allowance):
         to keep free, or where the finished deposit does not keep a guarantee."""
         from manifold3d import Manifold
 
-        from damageest.geometry.solids import subtract_lost, to_manifold, to_solid
+        from damageest.geometry.solids import subtract_lost, to_manifold
         from damageest.geometry.touching import separate_sheets
         from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
         from damageest.stages.allowance._cut_back import cut_back
@@ -94,9 +94,9 @@ class Milling(Allowance):
         if self.prepare is not None:
             cavity, opening = open_cavity(cavity, part, others, self.prepare, tolerance)
         crumb = max(CRUMB * damage.volume, SPECK * tolerance**3)
+        if cavity is not damage:
+            cavity = drop_crumbs(cavity, origin, crumb)
         hole, whole = to_manifold(cavity, origin), to_manifold(part, origin)
-        if cavity is not damage and (cleaned := drop_crumbs(hole, crumb)) is not hole:
-            hole, cavity = cleaned, to_solid(cleaned, origin) or cavity
         left = subtract_lost(whole, hole)
         skin = take_skin(cavity, part, plan, origin)
         reach = plan.max_height + tolerance
@@ -123,10 +123,12 @@ class Milling(Allowance):
         )
         milled: Solid | None = None
         if self.prepare is not None and cavity is not damage:
-            milled = to_solid(drop_crumbs(hole - to_manifold(damage, origin), crumb), origin)
+            milled = separate_sheets(hole - to_manifold(damage, origin), origin, tolerance)
+            milled = milled and drop_crumbs(milled, origin, crumb)
         body = separate_sheets(deposit, origin, tolerance)
         if body is None:
             raise StageError("the deposit is empty", "use a slightly different outer")
+        body = drop_crumbs(body, origin, crumb)
         notes = [f"{conflict}; clipped there" for conflict in narrow[:1]]
         notes += _describe_touching(conflicts, part)
         notes += _describe_stock(thickness, skins)

@@ -13,6 +13,7 @@ from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.stages.allowance import _booleans
 from damageest.stages.allowance._booleans import drop_crumbs
 from damageest.stages.allowance._prepare import open_cavity
 from damageest.stages.allowance.milling import Milling
@@ -148,8 +149,44 @@ def test_a_small_piece_and_a_small_void_are_crumbs() -> None:
     body = Manifold.cube((4, 4, 4), True)
     crumb = Manifold.cube((1e-3, 1e-3, 1e-3), True).translate((9, 0, 0))
     void = Manifold.cube((1e-3, 1e-3, 1e-3), True)
-    assert len((body - void + crumb).decompose()) == 3
-    cleaned = drop_crumbs(body - void + crumb, 1e-7 * body.volume())
-    assert len(cleaned.decompose()) == 1
-    assert cleaned.volume() == pytest.approx(64)
-    assert drop_crumbs(body, 1e-7) is body
+    crumbled, origin = as_solid(body - void + crumb), np.array([5.0, 1.0, 0.0])
+    assert len(to_manifold(crumbled).decompose()) == 3
+    cleaned = drop_crumbs(crumbled, origin, 1e-7 * body.volume())
+    assert len(to_manifold(cleaned).decompose()) == 1
+    assert cleaned.volume == pytest.approx(64)
+    assert drop_crumbs(cleaned, origin, 1e-7) is cleaned
+
+
+def test_a_deposit_has_no_crumbs_of_stock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Such of stock that touched the cavity at a vertex kept a gear's deposit from having a STEP file."""
+    crumb = Manifold.cube((0.01, 0.01, 0.01)).translate((8, 6, 0))
+    keep = _booleans.keep_touching
+    monkeypatch.setattr(_booleans, "keep_touching", lambda *given: keep(*given) + crumb)
+    tool = Manifold.cube((16, 12, 12), True)
+    block, damage = as_solid(BLOCK), as_solid(BLOCK ^ tool)
+    made = Milling(outer=0.0).run(
+        damage=damage, part=Part(block.vertices, block.faces), tolerance=TOLERANCE, others=None
+    )
+    assert isinstance(made, Deposit)
+    assert len(to_manifold(made).decompose()) == 1
+
+
+def test_a_neighbour_across_a_gap_is_left_alone() -> None:
+    """The wall of the opening, continued over the gap, cut the tip of the next tooth of a gear."""
+    tooth = Manifold.cube((10, 30, 20)).translate((0, -15, -20))
+    body = tooth + tooth.translate((14, 0, 0)) + Manifold.cube((24, 30, 4)).translate((0, -15, -24))
+    tool = Manifold.cube((16, 12, 12), True).translate((4, 0, 0))
+    _, cavity, made = prepare(tool - Manifold.cube((4, 40, 40), True).translate((12, 0, 0)), body, wall_angle=40)
+    assert made.milled is not None
+    assert made.milled.volume > 50  # the walls of its own tooth lean
+    assert cavity.bounding_box()[3] <= 10 + 1e-6
+    assert made.bounds[1, 0] <= 10 + 1e-6
+
+
+def test_what_stands_over_the_damage_is_removed_across_a_gap_too() -> None:
+    """As a lip over a groove: nothing reaches the damage under it."""
+    lip = Manifold.cube((60, 40, 2)).translate((-30, 5, 1))
+    post = Manifold.cube((60, 4, 23)).translate((-30, 36, -20))
+    _, cavity, made = prepare(Manifold.cube((16, 12, 12), True).translate((0, 8, 0)), BLOCK + lip + post)
+    assert cavity.bounding_box()[5] == pytest.approx(3)
+    assert made.milled is not None
