@@ -174,8 +174,6 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
 
     Raises ValueError where the mesh has no triangle with an area.
     """
-    import igl
-
     if not len(points):
         return np.empty(0), np.empty(0, np.int64)
     _require_some(mesh.faces, "triangle")
@@ -211,8 +209,7 @@ def signed_distance(points: Floats, mesh: Mesh) -> tuple[Floats, Ints]:
     if unreliable.any():
         doubtful |= beside & unreliable[faces[nearest]].any(axis=1)
     if doubtful.any():
-        winding = np.asarray(igl.fast_winding_number(vertices, mesh.faces, query[doubtful])).ravel()
-        signed[doubtful] = np.where(winding > 0.5, -1.0, 1.0) * np.abs(signed[doubtful])
+        signed[doubtful] = np.where(kept.wind(query[doubtful]) > 0.5, -1.0, 1.0) * np.abs(signed[doubtful])
     return _undo_order(order, signed), _undo_order(order, used[nearest])
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -27,6 +28,9 @@ FOLDED, SHARP = 0.1, 0.45
 """Where the mesh folds back: the cosine of the angle between the normals of a vertex and of a face there is less than
 that; the sum of the normals of two faces is shorter than this, so that their edge is sharper than 26 degrees."""
 
+MOST_WOUND = 100_000
+"""Triangles up to which what gives the winding number is kept: 200 bytes for each."""
+
 _last: WeakKeyDictionary[Mesh, SignedMesh] = WeakKeyDictionary()
 """The mesh that was asked last: more would hold memory that the next stages need."""
 
@@ -34,11 +38,12 @@ _last: WeakKeyDictionary[Mesh, SignedMesh] = WeakKeyDictionary()
 @dataclass(frozen=True, eq=False)
 class SignedMesh:
     """The ``vertices`` (V,3) and ``faces`` (F,3) of a watertight mesh, without flat ones, near the origin; ``tree``: as
-    `build_tree` gives it."""
+    `build_tree` gives it; ``whole`` (G,3): with the flat ones."""
 
     vertices: Floats
     faces: Ints
     tree: Tree
+    whole: Ints
 
     @cached_property
     def _normals(self) -> tuple[Floats, Floats, Floats, Ints]:
@@ -69,6 +74,22 @@ class SignedMesh:
         vertex[self.faces[against]] = True
         sharp = (np.linalg.norm(of_edge, axis=1) < SHARP)[opposite].any(axis=1)
         return np.asarray(vertex[self.faces].any(axis=1) | sharp)
+
+    def wind(self, points: Floats) -> Floats:
+        """The winding number (N,) of the mesh about points (N,3), as `winding_number`."""
+        winding = self._winding if len(self.whole) <= MOST_WOUND else self._prepare_winding()
+        return np.asarray(winding.winding_number(np.ascontiguousarray(points))).ravel()
+
+    @cached_property
+    def _winding(self) -> Any:
+        return self._prepare_winding()
+
+    def _prepare_winding(self) -> Any:
+        import igl
+
+        found = igl.FastWindingNumberBVH()
+        found.init(self.vertices, np.array(self.whole))
+        return found
 
     def measure(self, points: Floats) -> tuple[Floats, Ints, Floats, Floats]:
         """Signed distance (N,) of points (N,3), positive outside, the nearest face (N,), the nearest place (N,3) and
@@ -111,5 +132,5 @@ def keep_signed_mesh(mesh: Mesh, vertices: Floats, faces: Ints, find_tree: Calla
     `SignedMesh`."""
     if (found := _last.get(mesh)) is None:
         _last.clear()
-        found = _last[mesh] = SignedMesh(vertices, faces, find_tree())
+        found = _last[mesh] = SignedMesh(vertices, faces, find_tree(), mesh.faces)
     return found

@@ -178,7 +178,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "distance.run_libigl_pass": call_both(distance.run_libigl_pass),
     "pseudonormals.SignedMesh": call_both(
         lambda points, mesh: pseudonormals.SignedMesh(
-            mesh.vertices, mesh.faces, long_faces.build_tree(mesh.vertices, mesh.faces)
+            mesh.vertices, mesh.faces, long_faces.build_tree(mesh.vertices, mesh.faces), mesh.faces
         ).measure(points)[0]
     ),
     "distance_by_cells.signed_distance_by_cells": call_by_cells,

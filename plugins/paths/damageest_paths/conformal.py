@@ -38,6 +38,9 @@ NO_FLOOR, BESIDE = (
 )
 STEPS = "the floor of the cavity has steps, and no even layer goes over them"
 BENDS = "the layers bend too much both ways: beads laid side by side would lie far too close"
+MOST_LOST = 0.5
+"""Share of a body of which layers along the floor may leave no more; another plan reaches little of so much."""
+LOST = "layers that follow the floor of the cavity would leave more than half of it without a bead"
 SPARE = 0.02
 """Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
 SLIVER = 0.05
@@ -57,13 +60,15 @@ class NotFollowedError(Exception):
     """No even layers can follow the floor; the message says why."""
 
 
-def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Process) -> Plan:
+def plan_conformal(
+    body: Any, frame: Frame, around: Surroundings, process: Process, most_lost: float = MOST_LOST
+) -> Plan:
     """Passes that build up a body, a Manifold relative to the frame's origin, in layers along the cavity's floor.
 
     The top of each layer is a surface at equal distance above the floor, its passes are drawn in the plane into which
     it is unrolled. All layers have one height, at most the process's, so that the last ends with the thickest place.
     A place is built where metal or a pass of the layer below is near enough. Where the floor cannot be followed,
-    nothing is planned, and the reason says why.
+    or more than the share ``most_lost`` would be left, nothing is planned, and the reason says why.
     """
     local, metal = frame.move(body), frame.move(around.metal)
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
@@ -77,7 +82,7 @@ def plan_conformal(body: Any, frame: Frame, around: Surroundings, process: Proce
         height = min(thickest / count, process.height)
         work = _Work(local, near, floor, standing, process, height, torn)
         try:
-            work.build(count, corners)
+            work.build(count, corners, most_lost)
             return Plan(frame, height, tuple(work.passes), *work.join_missing())
         except NotFollowedError as error:
             plan = Plan(frame, height, (), local, {str(error): float(local.volume())})
@@ -121,7 +126,8 @@ class _Work:
     stack: list[tuple[Sheet, Floats]] = field(default_factory=list)
     covered: list[Any] = field(default_factory=list)
 
-    def build(self, count: int, corners: Floats) -> None:
+    def build(self, count: int, corners: Floats, most_lost: float) -> None:
+        """Plans the layers from the floor up. Raises NotFollowedError where that cannot be, or leaves too much."""
         grid = make_grid(self.floor, corners[0, :2], corners[1, :2], self.process)
         width = self.process.bead.width
         # all layers are laid out before the first is filled: what cannot be followed is refused without that
@@ -141,6 +147,8 @@ class _Work:
                 self._fill_patch(patch, number, reach, held - lean, around)
             before = self.passes[-1] if self.passes else None
             self.passes += order_passes(self.layer, before, self.standing.clearance, self.process)
+            if sum(self.volumes.values()) > most_lost * self.body.volume():
+                raise NotFollowedError(LOST)
         self._add_rest()
 
     def _lay_out(self, count: int, grid: Grid) -> list[tuple[Sheet, Floats, list[Patch]]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
-from damageest_paths.conformal import BESIDE, plan_conformal
+from damageest_paths.conformal import BESIDE, LOST, plan_conformal
 from damageest_paths.frames import Frame, make_frame, make_unit
 from damageest_paths.obstacles import draw_passes
 from damageest_paths.planar import SUNK, Surroundings, plan_planar
@@ -26,8 +26,6 @@ over metal for a bead is so with all of them, and layers along the floor follow 
 MOST_PARTS, MOST_DIRECTIONS = 4, 6
 MOST_LEFT = 0.9
 """Share of what is missing that another plan may leave."""
-HALF = 0.5
-"""Share of a body that layers along the floor may leave if what is left shall be planned again."""
 COARSE = 2.0
 """Factor of layer height and bead width for the trials of directions."""
 ROUGH = 0.1
@@ -82,7 +80,7 @@ def choose_direction(
     first = planner(body, make_frame(directions[0], origin), around, process)
     volume = float(body.volume())
     # where the first direction has no such layers, it is to be seen whether another has some
-    in_planes = planner is plan_conformal and bool(first.passes)
+    in_planes = planner is plan_conformal and (bool(first.passes) or LOST in first.reasons)
     if len(directions) == 1 or _measure_worth(first, volume) <= (LITTLE if in_planes else ENOUGH) * volume:
         return first
     lost = _try_directions(body, origin, directions, around, process, plan_planar if in_planes else planner)
@@ -115,8 +113,8 @@ def plan_parts(
     """Plans for the whole body, each for what the ones before have left, with a direction of its own.
 
     With 3 axes there is one plan. With more, the directions of later plans lie within the machine's tilt of the first.
-    Layers along a floor get another plan where the first fills half and leaves more than `LITTLE`, and trials in planes
-    reach something of the rest.
+    Layers along a floor get another plan where the first leaves more than `LITTLE`, and trials in planes reach some of
+    the rest.
     """
     plans = [choose_direction(body, origin, directions, around, process, planner)]
     if process.axes == 3:
@@ -135,12 +133,12 @@ def plan_parts(
         ]
         there = replace(around, metal=standing, others=[*around.others, *beads])
         if planner is plan_conformal:
-            if plans[-1].missing_volume > HALF * volume:
+            if not plans[-1].passes:
                 break
             lost = _try_directions(left_local, origin, within, there, process, plan_planar)
             if lost.min() > MOST_LEFT:
                 break
-            plan = planner(left_local, make_frame(within[int(np.argmin(lost))], origin), there, process)
+            plan = plan_conformal(left_local, make_frame(within[int(np.argmin(lost))], origin), there, process, 1.0)
         else:
             plan = choose_direction(left_local, origin, within, there, process, planner)
         if plan.missing_volume > MOST_LEFT * plans[-1].missing_volume:

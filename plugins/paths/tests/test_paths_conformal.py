@@ -31,6 +31,7 @@ from path_cavities import (
 )
 
 from damageest.artefacts import Floats
+from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_edges
 from damageest.geometry.solids import to_solid
 from tests.path_shapes import BLOCK, Loss, cut
@@ -157,11 +158,11 @@ def test_of_the_build_directions_that_is_taken_which_fills_far_more() -> None:
     lost, left = to_solid(BLOCK ^ notch), to_solid(BLOCK - notch + wall)
     assert lost is not None
     assert left is not None
-    paths = [plan_whole(Loss(lost, left), layers="conformal", axes=5, direction=d) for d in ("normal", "auto")]
-    shares = [path.unreached_volume / path.deposit_volume for path in paths]
-    assert shares[0] > 0.4
-    assert shares[1] < 0.1
-    assert paths[1].directions[0] == pytest.approx([0, 0, 1])
+    with pytest.raises(StageError, match="more than half of it"):
+        plan_whole(Loss(lost, left), layers="conformal", axes=5, direction="normal")
+    path = plan_whole(Loss(lost, left), layers="conformal", axes=5, direction="auto")
+    assert path.unreached_volume < 0.1 * path.deposit_volume
+    assert path.directions[0] == pytest.approx([0, 0, 1])
 
 
 def test_a_round_floor_is_followed_as_far_as_it_is_not_upright() -> None:
@@ -209,6 +210,20 @@ def test_layers_are_torn_at_a_low_step_and_what_has_no_bead_there_is_told() -> N
     assert 0.02 < told / scene.body.volume() < 0.07
     beads = sum(measure_length(one.points) for one in plan.passes) * scene.process.bead.step * plan.height
     assert beads + plan.missing_volume > 0.9 * scene.body.volume()
+
+
+def test_layers_that_would_leave_more_than_half_are_refused() -> None:
+    """A deep slot: the nozzle does not come to its bottom, and what lies above has nothing to stand on."""
+    narrow, wide = (cut(BLOCK, Manifold.cube((width, 60, 24)).translate((-width / 2, -30, -12))) for width in (4, 12))
+    scene = prepare(narrow, axes=3)
+    plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
+    assert not plan.passes
+    assert [why for why in plan.reasons if "more than half" in why]
+    assert plan.missing_volume == pytest.approx(scene.body.volume())
+    with pytest.raises(StageError, match="more than half of it without a bead"):
+        plan_whole(narrow, layers="conformal", axes=3)
+    path = plan_whole(wide, layers="conformal", axes=5)
+    assert path.unreached_volume < 0.5 * path.deposit_volume
 
 
 def test_no_floor_no_passes() -> None:
