@@ -17,6 +17,8 @@ BEAM = 12
 """Balls of each level that are followed straight down the tree."""
 ENOUGH = 1.5
 """Multiple of the needed distance from which a distance need not be known well."""
+EACH, WORTH = 8, 0.5
+"""One of so many poses is followed straight down the tree first; the others are if such a share of these hits."""
 CUTS = 9
 """How often a triangle is cut in four at most. An edge is 500 times shorter then."""
 MOST_PIECES = 200_000
@@ -48,7 +50,7 @@ class Descent:
         pairs = np.empty((0, 2), np.int64)
         if not len(ball):
             return low, high, pairs
-        self._dive(ball, tips, axes, needed, high)
+        self._find_hits(ball, tips, axes, needed, high)
         pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
         ball = np.tile(ball, count)[: len(pose)]
         for number, level in enumerate(levels):
@@ -76,6 +78,17 @@ class Descent:
             pose, ball = pose[kept], ball[kept]
         low[high < needed] = 0.0
         return low, high, pairs
+
+    def _find_hits(self, roots: Ints, tips: Floats, axes: Floats, needed: float, high: Floats) -> None:
+        """Lowers ``high`` (N,) by `_dive`, for all poses only where that decides many: one that is free has to go down
+        the whole tree after it."""
+        number = np.arange(len(high))
+        for own in (number[::EACH], number[number % EACH > 0]):
+            found = high[own]
+            self._dive(roots, tips[:, own], axes[:, own], needed, found)
+            high[own] = found
+            if (found < needed).sum() < WORTH * len(own):
+                break
 
     def _counts(self, level: Level, ball: Ints | None = None) -> Flags:
         """Whether the balls (K,) of a level, by default all, hold something that counts."""
