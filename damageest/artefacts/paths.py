@@ -216,8 +216,13 @@ class DepositPath(Checked):
 
     @property
     def bead_volume(self) -> float:
-        """Volume that the passes add: length by section."""
-        return float((self.moves * self.section[self.part - 1])[self.on].sum()) if len(self.points) else 0.0
+        """Volume that the passes add: length by section, larger or smaller as the beads are."""
+        if not len(self.points):
+            return 0.0
+        added = self.moves * self.section[self.part - 1]
+        if self.bead_sizes is not None:
+            added = added * self.bead_sizes.prod(axis=1) / (self.width * self.heights[self.part - 1])
+        return float(added[self.on].sum())
 
     @property
     def surplus_volume(self) -> float:

@@ -47,7 +47,7 @@ class PathReport(JsonModel):
     travel: float = Field(description="length of the moves between them")
     minutes: float
     wait_minutes: float = Field(description="of these, waits for neighbouring beads to cool down")
-    bead_volume: float = Field(description="volume that the passes add: length by section")
+    bead_volume: float = Field(description="volume that the passes add: length by section, that of the beads as laid")
     deposit_volume: float
     surplus_volume: float = Field(description="volume that the passes add beyond what of the deposit is reached")
     unreachable_volume: float = Field(description="of the deposit that no pass fills")

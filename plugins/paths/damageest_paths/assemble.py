@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -106,8 +106,8 @@ def _choose_travel(task: Task, clearance: Clearance, speeds: Speeds, process: Pr
     )  # fmt: skip
 
 
-def _describe_surplus(path: DepositPath) -> list[str]:
-    """Notes on beads that add more than the deposit has, or lie in metal."""
+def describe_surplus(path: DepositPath) -> DepositPath:
+    """The path with notes on beads that add more than the deposit has, or lie in metal."""
     notes = []
     share = path.surplus_volume / path.deposit_volume
     if share > MUCH_SURPLUS:
@@ -121,12 +121,10 @@ def _describe_surplus(path: DepositPath) -> list[str]:
             f"beads lie in {path.fill.sunk:.4g} of intact metal ({path.fill.sunk / path.deposit_volume:.0%} of the "
             "deposit): a smaller path.penetration or thinner layers leave more of it"
         )
-    return notes
+    return replace(path, notes=(*path.notes, *notes))
 
 
 def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath:
-    from dataclasses import replace
-
     notes = []
     share = path.unreached_volume / path.deposit_volume
     for item in path.unreached:
@@ -136,7 +134,6 @@ def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath
             )
     if share > 1e-3 and process.axes != 5:
         notes.append("more axes (path.axes: 5), another path.direction or a slimmer nozzle may reach more")
-    notes += _describe_surplus(path)
     total = path.length + path.travel
     if total and path.travel > MUCH_TRAVEL * total:
         mean = path.length / max(path.passes, 1)

@@ -203,10 +203,11 @@ class Layers(Path):
 
     def run(self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float) -> DepositPath | None:
         """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
-        from damageest_paths.assemble import Speeds, plan_moves
+        from damageest_paths.assemble import Speeds, describe_surplus, plan_moves
         from damageest_paths.directions import Planner, find_open_normal
         from damageest_paths.drafts import Draft, Task, draft_path
         from damageest_paths.form_choice import plan_in_form
+        from damageest_paths.laid import simulate_laid
         from damageest_paths.process import Cooling, Process
         from damageest_paths.settings import add_sizes, apply_table
         from damageest_paths.sight import Beam
@@ -254,7 +255,7 @@ class Layers(Path):
             why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
         path = apply_table(plan_moves(draft, speeds), self.process, self.interpass, body, left)
-        return add_sizes(path, self.calibration)
+        return describe_surplus(simulate_laid(add_sizes(path, self.calibration), draft))
 
     def _make_nozzle(self) -> Any:
         from damageest_paths import nozzle
