@@ -147,9 +147,13 @@ class _Work:
                 self._fill_patch(patch, number, reach, held - lean, around)
             before = self.passes[-1] if self.passes else None
             self.passes += order_passes(self.layer, before, self.standing.clearance, self.process)
-            if sum(self.volumes.values()) > most_lost * self.body.volume():
-                raise NotFollowedError(LOST)
+            self._require_enough(most_lost)
         self._add_rest()
+        self._require_enough(most_lost)
+
+    def _require_enough(self, most_lost: float) -> None:
+        if sum(self.volumes.values()) > most_lost * self.body.volume():
+            raise NotFollowedError(LOST)
 
     def _lay_out(self, count: int, grid: Grid) -> list[tuple[Sheet, Floats, list[Patch]]]:
         """The tops of the layers, how far the deposit is from each place of them, and the patches that are unrolled.
