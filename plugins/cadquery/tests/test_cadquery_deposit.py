@@ -233,9 +233,9 @@ def test_stock_of_another_volume_is_refused(done: Run) -> None:
     assert caught.value.faces
 
 
-def take_pit(radius: float, top: int) -> Piece:
-    """An exact pit, whose flat face is the CAD face ``top``."""
-    lost = cq.Workplane().box(30, 20, 12).intersect(cq.Workplane().sphere(radius).translate((2, 3, 6)))
+def take_pit(radius: float, top: int, place: tuple[float, float] = (2, 3)) -> Piece:
+    """An exact pit at a ``place`` of the CAD face ``top``, which its flat face is a piece of."""
+    lost = cq.Workplane().box(30, 20, 12).intersect(cq.Workplane().sphere(radius).translate((*place, 6)))
     solid = lost.val().Solids()[0].wrapped
     flat = [cq.Face(face).Center().z > 5.99 for face in explore_faces(solid)]
     return Piece(solid, 0, tuple((top, -1) if each else (-1, 0) for each in flat))
@@ -263,6 +263,28 @@ def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None
     # something took a part of the mesh's stock away: on the exact one it would be there
     with pytest.raises(StockError, match=r"mesh's|differs"):
         compare(high + 0.05, replace(deposit, stock_volume=0.98 * deposit.stock_volume))
+
+
+def test_a_small_body_of_the_damage_may_carry_stock(done: Run) -> None:
+    """As its own piece, though it is more than a thousandth of the deposit; a larger one is refused."""
+    site, part = done.result.sites[0], done.result.part
+    deposit = site.deposit
+    assert isinstance(deposit, Deposit)
+    ((top, _),) = deposit.heights
+    _, faces = take_damage()
+
+    def find(radius: float) -> list[float]:
+        damage = [take_pit(BALL["radius"], top), take_pit(radius, top, (8, 3))]
+        found = find_deposit(deposit, site.damage, damage, (), faces, part, 0.2)
+        return [measure_volume(piece.shape) for piece in found.pieces]
+
+    least = 1e-3 * deposit.volume
+    volumes = find(0.35)
+    assert len(volumes) == 2
+    assert min(volumes) == pytest.approx(np.pi * 0.35**2 * (HIGH + 2 / 3 * 0.35), rel=1e-4)
+    assert min(volumes) > least
+    with pytest.raises(StockError, match="2 solids for 1 pieces"):
+        find(0.45)
 
 
 def test_where_only_the_height_of_the_mesh_folds_the_mesh_is_lowered(
