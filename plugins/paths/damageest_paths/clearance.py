@@ -137,7 +137,7 @@ class Clearance:
         self, points: Floats, axes: Floats, needed: float, near: list[Ints] | None = None
     ) -> tuple[Floats, Floats]:
         """As `bound`, without the beam. ``near`` takes the poses and the ranks (K,2) of what may be nearer than
-        `ENOUGH` times the distance needed."""
+        `ENOUGH` times the distance needed; with it, the upper distance may be too large where it is not kept."""
         low, high = np.full(len(points), np.inf), np.full(len(points), np.inf)
         if self.obstacles is None or not self.obstacles.levels:
             return low, high
@@ -147,7 +147,7 @@ class Clearance:
         descent = Descent(self.obstacles, self.nozzle.profile, self.endless, self.floor, self.until)
         for start in range(0, len(points), CHUNK):
             own = slice(start, start + CHUNK)
-            low[own], high[own], pairs = descent.bound(tips[own], axes[own], needed + self.detail)
+            low[own], high[own], pairs = descent.bound(tips[own], axes[own], needed + self.detail, near is None)
             if near is not None:
                 near.append(pairs + np.array([start, 0], np.int64))
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)

@@ -36,12 +36,13 @@ class Descent:
     floor: float
     until: int
 
-    def bound(self, tips: Floats, axes: Floats, needed: float) -> tuple[Floats, Floats, Ints]:
+    def bound(self, tips: Floats, axes: Floats, needed: float, is_tight: bool = True) -> tuple[Floats, Floats, Ints]:
         """Two distances (N,) for poses with ``tips`` and ``axes`` (N,3): the true one lies between them. They are only
         as near to each other as it takes to see whether ``needed`` is kept; the lower one is 0 where it is not. And the
         poses and ranks (K,2) of what may be nearer than `ENOUGH` times that.
 
         Most poses that are not free are found straight down the tree; the others go down it wherever a ball is near.
+        ``is_tight``: whether the upper distance counts where it is below ``needed``; else it may be larger there.
         """
         levels, count = self.obstacles.levels, len(tips)
         low, high = np.full(count, np.inf), np.full(count, np.inf)
@@ -50,7 +51,10 @@ class Descent:
         pairs = np.empty((0, 2), np.int64)
         if not len(ball):
             return low, high, pairs
-        self._find_hits(ball, tips, axes, needed, high)
+        if is_tight:
+            self._dive(ball, tips, axes, needed, high)
+        else:
+            self._find_hits(ball, tips, axes, needed, high)
         pose = np.repeat(np.flatnonzero(high >= needed), len(ball))
         ball = np.tile(ball, count)[: len(pose)]
         for number, level in enumerate(levels):
