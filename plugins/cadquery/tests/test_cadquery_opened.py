@@ -81,7 +81,9 @@ def test_deposit_and_metal_to_mill_off_have_the_cad_faces(opened: Run) -> None:
         form = said["exact"]["milled"]
         assert (form["reason"], said["exact"]["deposit"]["reason"]) == ("", "")
         assert form["form"] in ("shapes", "spline", "planes", "facets")
-        assert form["distance"] <= opened.result.tolerance / 4
+        # a tenth of shapes and planes may be farther than a quarter of the tolerance: the mesh rounds their edges
+        assert form["beyond"] <= (0.1 if form["form"] in ("shapes", "planes") else 0.02)
+        assert form["distance"] <= opened.result.tolerance / 3
         milled = opened.read(f"milled/site-{site.id}")
         assert milled.Volume() == pytest.approx(form["volume"], rel=1e-4)
         assert milled.Volume() == pytest.approx(made.milled.volume, abs=0.003 * made.cavity.volume)
