@@ -201,9 +201,13 @@ class DepositPath(Checked):
     @property
     def sizes(self) -> Floats:
         """Width and height (N,2) of the bead of each move."""
+        return self.planned_sizes if self.bead_sizes is None else self.bead_sizes
+
+    @property
+    def planned_sizes(self) -> Floats:
+        """Width and height (N,2) with which the bead of each move was planned."""
         heights = self.heights[self.part - 1]
-        planned = np.column_stack([np.full(len(heights), self.width), heights])
-        return planned if self.bead_sizes is None else self.bead_sizes
+        return np.column_stack([np.full(len(heights), self.width), heights])
 
     @property
     def passes(self) -> int:
@@ -221,7 +225,7 @@ class DepositPath(Checked):
             return 0.0
         added = self.moves * self.section[self.part - 1]
         if self.bead_sizes is not None:
-            added = added * self.bead_sizes.prod(axis=1) / (self.width * self.heights[self.part - 1])
+            added = added * self.bead_sizes.prod(axis=1) / self.planned_sizes.prod(axis=1)
         return float(added[self.on].sum())
 
     @property

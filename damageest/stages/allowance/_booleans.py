@@ -11,6 +11,8 @@ from damageest.geometry.solids import compose_shells, to_manifold, to_solid
 
 SLACK = 1e-5
 """Largest accepted change of a solid's volume, as a share of it; a tenth of what the check of a deposit accepts."""
+TOUCHING = 1e-3
+"""Tolerances between two bodies up to which they touch."""
 DUST = 1e-9
 """Share of the stock's volume below which a piece of it is a rounding error."""
 
@@ -30,8 +32,13 @@ def keep_touching(stock: Any, filled: Any, tolerance: float) -> Any:
     least = DUST * stock.volume()
     pieces = [piece for piece in stock.decompose() if abs(piece.volume()) > least]
     if len(pieces) > 1:  # a cavity has a negative volume and belongs to the piece around it
-        pieces = [p for p in pieces if p.volume() < 0 or p.min_gap(filled, tolerance) <= 1e-3 * tolerance]
+        pieces = [piece for piece in pieces if piece.volume() < 0 or touches(piece, filled, tolerance)]
     return compose_shells(pieces)
+
+
+def touches(piece: Any, body: Any, tolerance: float) -> bool:
+    """Whether two Manifolds touch, within `TOUCHING`."""
+    return bool(piece.min_gap(body, tolerance) <= TOUCHING * tolerance)
 
 
 def drop_crumbs(solid: Solid, origin: Floats, least: float) -> Solid:

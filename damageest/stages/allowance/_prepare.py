@@ -19,6 +19,7 @@ from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.geometry.transforms import turn_to_axis
 from damageest.geometry.vectors import normalise
 from damageest.options import Options
+from damageest.stages.allowance._booleans import touches
 
 NODES = 160
 """Nodes of the grid along its longer side at most."""
@@ -34,8 +35,6 @@ SIMPLE = 1 / 8
 """Tolerances by which the surface of the opened cavity is simplified."""
 CLEAR = 2.0
 """Tolerances by which what the cutter opens goes on above the damage where there is no metal."""
-TOUCHING = 1e-3
-"""Tolerances between damage and a piece of metal up to which they touch."""
 CRUMB = 1e-9
 """Share of the damage volume below which metal to mill off is rounding."""
 
@@ -143,7 +142,8 @@ def open_cavity(
     def cut(one: _Column) -> tuple[Any, Any]:
         room = one.raise_body().simplify(SIMPLE * tolerance).transform(np.column_stack([turn.T, np.zeros(3)]))
         # joined first: where faces coincide, as those of the damage with the skin, volumes may come out wrong
-        return room + lost, whole ^ (room + lost)
+        opening = room + lost
+        return opening, whole ^ opening
 
     opening, opened = cut(column)
     kept, aside = _tell_apart(opened, lost, tolerance)
@@ -162,7 +162,7 @@ def open_cavity(
 def _tell_apart(opened: Any, lost: Any, tolerance: float) -> tuple[list[Any], list[Any]]:
     """The pieces of a Manifold that touch ``lost``, and those that do not."""
     pieces = [each for each in opened.decompose() if each.volume() > 0]
-    touch = [each.min_gap(lost, tolerance) <= TOUCHING * tolerance for each in pieces]
+    touch = [touches(each, lost, tolerance) for each in pieces]
     return list(compress(pieces, touch)), list(compress(pieces, np.logical_not(touch)))
 
 

@@ -23,8 +23,7 @@ def simulate_laid(path: DepositPath, draft: Draft) -> DepositPath:
     if path.bead_sizes is None or draft.fill is None:
         return path
     own = np.flatnonzero(path.on)
-    planned = np.column_stack([np.full(len(own), path.width), path.heights[path.part[own] - 1]])
-    sizes = path.bead_sizes[own]
+    sizes, planned = path.bead_sizes[own], path.planned_sizes[own]
     if np.allclose(sizes, planned, rtol=ALIKE, atol=0.0):
         return path
     task, above = draft.task, (sizes - planned)[:, 1:] * path.normals[own]

@@ -87,15 +87,15 @@ def add_sizes(path: DepositPath, trials: Sequence[Trial]) -> DepositPath:
     values = {SPEED: path.feed[own]}
     if path.values is not None:
         values.update(zip(path.channels, path.values[own].T, strict=True))
-    heights = path.heights[path.part - 1]
-    sizes = np.column_stack([np.full(len(heights), path.width), heights])
+    sizes = path.planned_sizes
+    heights = sizes[own, 1]
     try:
         sizes[own] = predict_beads(trials, values)
     except ValueError as error:
         raise StageError(
             f"calibration: {error}", "more rows of path.calibration, or other values in path.process"
         ) from error
-    notes = describe_beads(sizes[own], path.width, heights[own])
+    notes = describe_beads(sizes[own], path.width, heights)
     return replace(path, bead_sizes=sizes, notes=(*path.notes, *notes))
 
 
