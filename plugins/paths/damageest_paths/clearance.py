@@ -12,21 +12,17 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.descent import ENOUGH, Descent
 from damageest_paths.nozzle import Nozzle
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.sight import Beam
 
-CHUNK = 1024
-"""Poses that are bounded at once, so that intermediate arrays fit in the processor's cache."""
 STRIDES = (16, 4, 1)
 """Of the poses of a pass, each sixteenth is measured first, then those in between for which it does not decide."""
 CLOSE = 0.1
 """Share of the needed distance by which a pose may keep more and yet count as one that does not keep it, where the
 bounds do not decide: then an exact distance is not worth its time."""
-MOST_RANKS = 1 << 30
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,24 +129,25 @@ class Clearance:
             high[most < self.beam.needed] = 0.0
         return low, high
 
-    def _bound_body(
-        self, points: Floats, axes: Floats, needed: float, near: list[Ints] | None = None
-    ) -> tuple[Floats, Floats]:
-        """As `bound`, without the beam. ``near`` takes the poses and the ranks (K,2) of what may be nearer than
-        `ENOUGH` times the distance needed; with it, the upper distance may be too large where it is not kept."""
-        low, high = np.full(len(points), np.inf), np.full(len(points), np.inf)
-        if self.obstacles is None or not self.obstacles.levels:
-            return low, high
-        if self.nozzle.profile is None:
-            return np.zeros(len(points)), high
-        tips = points + self.standoff * axes
-        descent = Descent(self.obstacles, self.nozzle.profile, self.endless, self.floor, self.until)
-        for start in range(0, len(points), CHUNK):
-            own = slice(start, start + CHUNK)
-            low[own], high[own], pairs = descent.bound(tips[own], axes[own], needed + self.detail, near is None)
-            if near is not None:
-                near.append(pairs + np.array([start, 0], np.int64))
+    def _bound_body(self, points: Floats, axes: Floats, needed: float, is_tight: bool = True) -> tuple[Floats, Floats]:
+        """As `bound`, without the beam. ``is_tight``: see `Descent.bound`."""
+        if self.descent is None:
+            high = np.full(len(points), np.inf)
+            return (high if self.is_alone else np.zeros(len(points))), high.copy()
+        low, high = self.descent.bound(points + self.standoff * axes, axes, needed + self.detail, is_tight)
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
+
+    @property
+    def is_alone(self) -> bool:
+        """Whether there are no obstacles."""
+        return self.obstacles is None or self.obstacles.boxes is None
+
+    @cached_property
+    def descent(self) -> Descent | None:
+        """What finds the bounds; None without obstacles, and for a nozzle that is no solid of revolution."""
+        if self.obstacles is None or self.obstacles.boxes is None or self.nozzle.profile is None:
+            return None
+        return Descent(self.obstacles.boxes, self.nozzle.profile, self.endless, self.floor, self.until)
 
     def measure_poses(self, points: Floats, axes: Floats, needed: float) -> Floats:
         """For each pose (N,) a distance that the nozzle keeps at least; below ``needed`` only where it really is, or
@@ -180,31 +177,23 @@ class Clearance:
 
     def _measure_some(self, points: Floats, axes: Floats, far: Floats, needed: float) -> Floats:
         """As `measure_poses`; ``far`` (N,): the way to each pose."""
-        near: list[Ints] = []
-        low, high = self._bound_body(points, axes, needed, near)
+        low, high = self._bound_body(points, axes, needed, is_tight=False)
         found = np.where(high < needed, high, low)
-        undecided = np.flatnonzero((low < needed) & (high >= (1 + CLOSE) * needed))
-        if not len(undecided):
-            return found
-        ranks = self._list_ranks(near, undecided, len(points))
         known, at = -np.inf, 0.0
-        for k, own in zip(undecided, ranks, strict=True):
+        for k in np.flatnonzero((low < needed) & (high >= (1 + CLOSE) * needed)):
             if known - (far[k] - at) < needed:
-                known, at = self.measure(points[k], axes[k], own), float(far[k])
-                if own is not None:  # the others are farther than that
+                ranks = self._list_near_ranks(points[k], axes[k], needed)
+                known, at = self.measure(points[k], axes[k], ranks), float(far[k])
+                if ranks is not None:  # the others are farther than that
                     known = min(known, ENOUGH * needed)
             found[k] = known - (far[k] - at)
         return found
 
-    def _list_ranks(self, near: list[Ints], chosen: Ints, count: int) -> list[Ints | None]:
-        """For each of the ``chosen`` of ``count`` poses the ranks of what may be near; None for all."""
-        assert self.obstacles is not None
-        if not near or self.obstacles.ranks[-1] == self.obstacles.ranks[0]:
-            return [None] * len(chosen)
-        number = list_distinct(np.concatenate(near) @ np.array([MOST_RANKS, 1]))
-        pose, rank = number // MOST_RANKS, number % MOST_RANKS
-        ends = np.searchsorted(pose, np.arange(count + 1))
-        return [rank[ends[k] : ends[k + 1]] for k in chosen]
+    def _list_near_ranks(self, point: Floats, axis: Floats, needed: float) -> Ints | None:
+        """The ranks (K,) of what may be near at a pose; None for all."""
+        if self.descent is None or self.obstacles is None or self.obstacles.ranks[-1] == self.obstacles.ranks[0]:
+            return None
+        return self.descent.list_near_ranks(point + self.standoff * axis, axis, needed + self.detail)
 
     def bound_moves(self, points: Floats, axes: Floats) -> Floats:
         """How far (N-1,) any point of the nozzle moves at most from each pose of a path to the next, ``points`` and

@@ -82,7 +82,7 @@ def plan_conformal(
         height = min(thickest / count, process.height)
         work = _Work(local, near, floor, standing, process, height, torn)
         try:
-            work.build(count, corners, most_lost)
+            work.build(count, places, most_lost)
             return Plan(frame, height, tuple(work.passes), *work.join_missing())
         except NotFollowedError as error:
             plan = Plan(frame, height, (), local, {str(error): float(local.volume())})
@@ -126,9 +126,11 @@ class _Work:
     stack: list[tuple[Sheet, Floats]] = field(default_factory=list)
     covered: list[Any] = field(default_factory=list)
 
-    def build(self, count: int, corners: Floats, most_lost: float) -> None:
-        """Plans the layers from the floor up. Raises NotFollowedError where that cannot be, or leaves too much."""
-        grid = make_grid(self.floor, corners[0, :2], corners[1, :2], self.process)
+    def build(self, count: int, places: Floats, most_lost: float) -> None:
+        """Plans the layers from the floor up. ``places`` (K,3): see `make_grid`. Raises NotFollowedError where that
+        cannot be, or leaves too much."""
+        grid = make_grid(self.floor, places, self.process)
+        low, high = places.min(axis=0), places.max(axis=0)
         width = self.process.bead.width
         # all layers are laid out before the first is filled: what cannot be followed is refused without that
         layers = self._lay_out(count, grid)
@@ -140,7 +142,7 @@ class _Work:
             self.stack.append((sheet, reach))
             top = self._gather_top(grid)
             meshes = [top] if len(top.faces) else []
-            above = Obstacles(meshes, corners[0], corners[1], width, coarser=COARSER)
+            above = Obstacles(meshes, low, high, width, coarser=COARSER)
             around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]
             self.layer = []
             for patch in patches:

@@ -35,13 +35,15 @@ STEEP = 0.15
 
 class Grid(NamedTuple):
     """Columns (N,2), at a distance of ``edge``, with a triangle (F,3) between each three neighbours, and the number of
-    rows and columns. ``coarse`` (G,3): the same with larger triangles."""
+    rows and columns. ``coarse`` (G,3): the same with larger triangles. ``near`` (K,): the numbers of the columns that
+    are near enough to the deposit for what is drawn on a layer."""
 
     columns: Floats
     edge: float
     faces: Ints
     coarse: Ints
     shape: tuple[int, int]
+    near: Ints
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,21 +58,26 @@ class Sheet:
     is_found: Flags
 
 
-def make_grid(floor: Floor, low: Floats, high: Floats, process: Process) -> Grid:
-    """Columns over the box from ``low`` to ``high`` (2,), denser the steeper the floor is."""
+def make_grid(floor: Floor, places: Floats, process: Process) -> Grid:
+    """Columns over the box round a deposit, denser the steeper the floor is. ``places`` (K,3): on the deposit, no
+    farther from each other than a bead's width."""
+    from scipy.spatial import cKDTree
+
     width = process.bead.width
     slope = np.sort(np.abs(floor.mesh.face_normals[:, 2]))
     steep = max(float(slope[len(slope) // 20]), 0.5)
     edge = FINE * width * steep
     margin = width + max(process.extend) + 2 * edge
-    low, high = low - margin, high + margin
+    low, high = places[:, :2].min(axis=0) - margin, places[:, :2].max(axis=0) + margin
     edge *= max(1.0, float(np.sqrt(np.prod((high - low) / edge) / MOST_COLUMNS)))
     x, y = (np.arange(low[k], high[k] + edge, edge) for k in range(2))
     columns = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     number = np.arange(len(columns)).reshape(len(x), len(y))
     stride = max(1, int(COARSE * width / edge))
     rows, lines = (np.unique(np.append(np.arange(0, many, stride), many - 1)) for many in number.shape)
-    return Grid(columns, edge, _span(number), _span(number[np.ix_(rows, lines)]), number.shape)
+    away = cKDTree(places[:, :2]).query(columns, distance_upper_bound=margin + width)[0]
+    near = np.flatnonzero(np.isfinite(away))
+    return Grid(columns, edge, _span(number), _span(number[np.ix_(rows, lines)]), number.shape, near)
 
 
 def _span(number: Ints) -> Ints:
@@ -95,16 +102,17 @@ def guess_heights(floor: Floor, grid: Grid) -> Floats:
 def lay_sheet(floor: Floor, grid: Grid, heights: Floats, depth: float, process: Process, spacing: float) -> Sheet:
     """The sheet at a depth, found from heights (N,) near to it. ``spacing``: the layer height."""
     points = np.column_stack([grid.columns, heights])
-    distance, upward = floor.measure(points)
-    distance, upward = distance.copy(), upward.copy()
-    for _ in range(STEPS):
-        far = np.flatnonzero(np.abs(depth - distance) > CLOSE * spacing)
-        if not len(far):
+    off, upward = np.full(len(points), np.inf), np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    far = grid.near
+    for number in range(STEPS + 1):
+        distance, upward[far] = floor.measure(points[far])
+        off[far] = depth - distance
+        far = far[np.abs(off[far]) > CLOSE * spacing]
+        if number == STEPS or not len(far):
             break
-        step = (depth - distance[far]) / np.maximum(upward[far, 2], STEEP)
+        step = off[far] / np.maximum(upward[far, 2], STEEP)
         points[far, 2] += np.clip(step, -spacing, spacing)
-        distance[far], upward[far] = floor.measure(points[far])
-    is_found = (np.abs(depth - distance) < 0.02 * spacing) & (upward[:, 2] > STEEP)
+    is_found = (np.abs(off) < 0.02 * spacing) & (upward[:, 2] > STEEP)
     rounds = int(np.clip(np.ceil((process.bead.width / 2 / grid.edge) ** 2), 1, 100))
     return Sheet(depth, points, upward, _smooth(upward, is_found, grid.shape, rounds), is_found)
 
