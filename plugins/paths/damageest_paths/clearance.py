@@ -132,15 +132,10 @@ class Clearance:
     def _bound_body(self, points: Floats, axes: Floats, needed: float, is_tight: bool = True) -> tuple[Floats, Floats]:
         """As `bound`, without the beam. ``is_tight``: see `Descent.bound`."""
         if self.descent is None:
-            high = np.full(len(points), np.inf)
-            return (high if self.is_alone else np.zeros(len(points))), high.copy()
+            alone = self.obstacles is None or self.obstacles.boxes is None
+            return np.full(len(points), np.inf if alone else 0.0), np.full(len(points), np.inf)
         low, high = self.descent.bound(points + self.standoff * axes, axes, needed + self.detail, is_tight)
         return np.maximum(low - self.detail, 0.0), np.maximum(high - self.detail, 0.0)
-
-    @property
-    def is_alone(self) -> bool:
-        """Whether there are no obstacles."""
-        return self.obstacles is None or self.obstacles.boxes is None
 
     @cached_property
     def descent(self) -> Descent | None:

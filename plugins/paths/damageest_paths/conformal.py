@@ -24,7 +24,7 @@ from damageest_paths.sheets import (
     FINE,
     Grid,
     Sheet,
-    guess_heights,
+    lay_ground,
     lay_sheet,
     make_grid,
     measure_reach,
@@ -161,13 +161,12 @@ class _Work:
         """The tops of the layers, how far the deposit is from each place of them, and the patches that are unrolled.
         Raises NotFollowedError."""
         solid = Mesh(*to_arrays(self.body))
-        heights = guess_heights(self.floor, grid)
+        sheet = lay_ground(self.floor, grid)
         spacing = 3 * FINE * self.process.bead.width
         found, steps, bends = [], 0.0, 0.0
         most = self.torn * float(self.body.volume()) / self.height
         for number in range(count):
-            sheet = lay_sheet(self.floor, grid, heights, (number + 1) * self.height, self.process, self.height)
-            heights = sheet.points[:, 2]
+            sheet = lay_sheet(self.floor, grid, sheet, (number + 1) * self.height, self.process, self.height)
             reach = measure_reach(sheet, solid, self.height, spacing) + THIN * self.height
             unrolling = list_patches(sheet, grid, reach, self.floor, self.process)
             steps, bends = steps + unrolling.steps, bends + unrolling.bends

@@ -46,18 +46,9 @@ class Descent:
         low, high = np.empty(len(tips)), np.empty(len(tips))
         tips, axes = np.ascontiguousarray(tips), np.ascontiguousarray(axes)
         bound_poses(
-            tips,
-            axes,
-            self._shape,
-            needed,
-            ENOUGH * needed,
-            is_tight,
-            self.boxes.tree,
-            self.floor,
-            self.until,
-            low,
+            tips, axes, self._shape, needed, ENOUGH * needed, is_tight, self.boxes.tree, self.floor, self.until, low,
             high,
-        )
+        )  # fmt: skip
         return low, high
 
     def bound_stretches(

@@ -37,9 +37,9 @@ R = TypeVar("R")
 def compile_loops(function: Callable[P, R]) -> Callable[P, R]:
     """The function, compiled when it is first called; in each process anew where no folder can be written."""
     try:
-        return cast("Callable[P, R]", numba.njit(cache=True)(function))
+        return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy")(function))
     except RuntimeError:  # no folder to keep it in
-        return cast("Callable[P, R]", numba.njit(function))
+        return cast("Callable[P, R]", numba.njit(error_model="numpy")(function))
 
 
 def describe_shape(profile: Floats, endless: bool) -> Floats:
@@ -64,13 +64,14 @@ def _measure_profile(height: float, radius: float, shape: Floats) -> tuple[float
     beside, beyond, above = radius - shape[0], radius - shape[1], height - shape[6]
     along = height * up + beside * out
     if above > 0 and beyond > 0:
-        away = np.hypot(above, beyond)
+        away = np.sqrt(above * above + beyond * beyond)
         return away, above / away, beyond / away
     if along > shape[5] and height < rise:
-        away = np.hypot(height - rise, beyond)
-        return away, (height - rise) / away, beyond / away
+        over = height - rise
+        away = np.sqrt(over * over + beyond * beyond)
+        return away, over / away, beyond / away
     if along < 0 and beside > 0:
-        away = np.hypot(height, beside)
+        away = np.sqrt(height * height + beside * beside)
         return away, height / away, beside / away
     cone = beside * up - height * out
     if cone >= max(beyond, -height, above):

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
+from damageest.geometry.vectors import measure_longest_edges
 from damageest_paths.boxes import Boxes, make_boxes
 from damageest_paths.frames import find_across
 from damageest_paths.process import Pass
@@ -112,14 +113,13 @@ def _cut_triangles(triangles: Floats, low: Floats, high: Floats, width: float) -
     """Triangles (F,3,3), halved at their longest edges until they are small enough for their distance from a box."""
     done = []
     while len(triangles):
-        away = triangles.mean(axis=1)
-        away = np.linalg.norm(np.maximum(np.maximum(low - away, away - high), 0), axis=1)
-        sides = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)
-        longest = sides.argmax(axis=1)
-        large = sides.max(axis=1) > np.maximum(FINE * width, GROWTH * away)
+        middle = (triangles[:, 0] + triangles[:, 1] + triangles[:, 2]) / 3
+        away = np.linalg.norm(np.maximum(np.maximum(low - middle, middle - high), 0), axis=1)
+        large = measure_longest_edges(triangles) > np.maximum(FINE * width, GROWTH * away)
         done.append(triangles[~large])
         cut = triangles[large]
-        order = (longest[large, None] + np.arange(3)) % 3
+        longest = np.linalg.norm(cut - np.roll(cut, -1, axis=1), axis=2).argmax(axis=1)
+        order = (longest[:, None] + np.arange(3)) % 3
         a, b, c = np.moveaxis(np.take_along_axis(cut, order[..., None], axis=1), 1, 0)
         middle = (a + b) / 2
         triangles = np.concatenate([np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)])

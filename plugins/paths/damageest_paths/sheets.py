@@ -21,8 +21,8 @@ COARSE = 0.2
 MOST_COLUMNS = 20_000
 STEPS = 30
 """Steps by which a column is brought to a depth at most."""
-CLOSE = 1e-5
-"""Share of the layer height to which it is brought."""
+CLOSE = 1e-4
+"""Share of the layer height to which it is brought. Places of passes are brought nearer, see `SheetTree.find`."""
 SAMPLES = 9
 """Places between the top and the bottom of a layer at which it is looked for the deposit."""
 UNDER = 0.25
@@ -99,19 +99,29 @@ def guess_heights(floor: Floor, grid: Grid) -> Floats:
     )
 
 
-def lay_sheet(floor: Floor, grid: Grid, heights: Floats, depth: float, process: Process, spacing: float) -> Sheet:
-    """The sheet at a depth, found from heights (N,) near to it. ``spacing``: the layer height."""
-    points = np.column_stack([grid.columns, heights])
-    off, upward = np.full(len(points), np.inf), np.tile([0.0, 0.0, 1.0], (len(points), 1))
+def lay_ground(floor: Floor, grid: Grid) -> Sheet:
+    """The sheet from which the first layer is laid: its points are near the floor, and not at one depth."""
+    points = np.column_stack([grid.columns, guess_heights(floor, grid)])
+    upward, is_found = np.tile([0.0, 0.0, 1.0], (len(points), 1)), np.zeros(len(points), bool)
+    return Sheet(0.0, points, upward, upward, is_found)
+
+
+def lay_sheet(floor: Floor, grid: Grid, below: Sheet, depth: float, process: Process, spacing: float) -> Sheet:
+    """The sheet at a depth, found from that ``below`` it. ``spacing``: the layer height."""
+    points, upward, off = below.points.copy(), below.upward.copy(), np.full(len(below.points), np.inf)
+    off[below.is_found] = depth - below.depth
+    far = grid.near[~below.is_found[grid.near]]
+    distance, upward[far] = floor.measure(points[far])
+    off[far] = depth - distance
     far = grid.near
-    for number in range(STEPS + 1):
-        distance, upward[far] = floor.measure(points[far])
-        off[far] = depth - distance
+    for _ in range(STEPS):
         far = far[np.abs(off[far]) > CLOSE * spacing]
-        if number == STEPS or not len(far):
+        if not len(far):
             break
         step = off[far] / np.maximum(upward[far, 2], STEEP)
         points[far, 2] += np.clip(step, -spacing, spacing)
+        distance, upward[far] = floor.measure(points[far])
+        off[far] = depth - distance
     is_found = (np.abs(off) < 0.02 * spacing) & (upward[:, 2] > STEEP)
     rounds = int(np.clip(np.ceil((process.bead.width / 2 / grid.edge) ** 2), 1, 100))
     return Sheet(depth, points, upward, _smooth(upward, is_found, grid.shape, rounds), is_found)
