@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints
+from damageest.artefacts import Floats, Ints, Singles
 from damageest.geometry.duplicates import order_integers
 from damageest.geometry.morton import encode_cells
 
@@ -39,11 +39,11 @@ class Boxes:
     rank: Ints
     first: Ints
     roots: int
-    corners: Floats
+    corners: Singles
     turn: Floats
 
     @property
-    def tree(self) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Floats, Floats]:
+    def tree(self) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Singles, Floats]:
         """All as plain arrays, and how many boxes the first level has and each box holds, for `loops`."""
         sizes = np.array([self.roots, MEMBERS])
         return (

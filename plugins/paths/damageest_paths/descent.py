@@ -41,13 +41,14 @@ class Descent:
 
         ``is_tight``: whether the upper distance counts where it is below ``needed``; else it may be larger there.
         """
+        from damageest_paths.compiling import run_loops
         from damageest_paths.loops import bound_poses
 
         low, high = np.empty(len(tips)), np.empty(len(tips))
         tips, axes = np.ascontiguousarray(tips), np.ascontiguousarray(axes)
-        bound_poses(
-            tips, axes, self._shape, needed, ENOUGH * needed, is_tight, self.boxes.tree, self.floor, self.until, low,
-            high,
+        run_loops(
+            bound_poses, tips, axes, self._shape, needed, ENOUGH * needed, is_tight, self.boxes.tree, self.floor,
+            self.until, low, high,
         )  # fmt: skip
         return low, high
 
@@ -60,23 +61,26 @@ class Descent:
 
         Distances are not computed well where they are larger than ``needed``; -inf where it is not kept.
         """
+        from damageest_paths.compiling import run_loops
         from damageest_paths.loops import bound_stretches
 
         found = np.empty(len(points))
         points, axes = np.ascontiguousarray(points), np.ascontiguousarray(axes)
-        bound_stretches(
-            points, axes, standoff, shift, turn, self._shape, needed, self.boxes.tree, self.floor, self.until, found
-        )
+        run_loops(
+            bound_stretches, points, axes, standoff, shift, turn, self._shape, needed, self.boxes.tree, self.floor,
+            self.until, found,
+        )  # fmt: skip
         return found
 
     def list_near_ranks(self, tip: Floats, axis: Floats, needed: float) -> Ints:
         """The ranks (K,) of what may be nearer than `ENOUGH` times ``needed`` at a pose with ``tip`` and ``axis``
         (3,)."""
+        from damageest_paths.compiling import run_loops
         from damageest_paths.loops import mark_near_ranks
 
         near = np.zeros(int(self.boxes.rank.max()) + 1, bool)
-        mark_near_ranks(
-            np.ascontiguousarray(tip), np.ascontiguousarray(axis), self._shape, ENOUGH * needed, self.boxes.tree,
-            self.floor, self.until, near,
+        run_loops(
+            mark_near_ranks, np.ascontiguousarray(tip), np.ascontiguousarray(axis), self._shape, ENOUGH * needed,
+            self.boxes.tree, self.floor, self.until, near,
         )  # fmt: skip
         return np.flatnonzero(near)

@@ -1,20 +1,17 @@
 """Distances of the nozzle from a tree of boxes, in loops that the Numba library compiles.
 
 Each pose goes down the tree alone, to the nearest box first, and stops where it is decided. This module is imported
-where it is used only: Numba takes a third of a second to load. What it has compiled is kept beside this file, or in the
-user's cache, until this file changes. So nothing that is compiled comes from another file, and the loops take plain
-arrays: a kept one that names a class cannot be read once that has moved.
+where it is used only: Numba takes a third of a second to load. Compiled loops are kept until this file changes. So
+nothing that is compiled comes from another file, and the loops take plain arrays: a kept one that names a class cannot
+be read once that has moved.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import ParamSpec, TypeVar, cast
-
-import numba
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints
+from damageest.artefacts import Flags, Floats, Ints, Singles
+from damageest_paths.compiling import compile_loops
 
 CUTS = 9
 """How often a triangle is cut in four at most. An edge is 500 times shorter then."""
@@ -25,21 +22,10 @@ DEPTH = 16
 LATER = 4096
 """Triangles of a pose that may wait to be cut until all others were looked at."""
 
-Tree = tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Floats, Floats]
+Tree = tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Singles, Floats]
 """See `Boxes.tree`."""
 Open = tuple[Ints, Floats, Floats]
 """The boxes that are open: their numbers, a distance that all of each keeps, and that of its middle."""
-
-P = ParamSpec("P")
-R = TypeVar("R")
-
-
-def compile_loops(function: Callable[P, R]) -> Callable[P, R]:
-    """The function, compiled when it is first called; in each process anew where no folder can be written."""
-    try:
-        return cast("Callable[P, R]", numba.njit(cache=True, error_model="numpy")(function))
-    except RuntimeError:  # no folder to keep it in
-        return cast("Callable[P, R]", numba.njit(error_model="numpy")(function))
 
 
 def describe_shape(profile: Floats, endless: bool) -> Floats:

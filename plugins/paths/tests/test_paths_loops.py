@@ -8,7 +8,7 @@ import numba
 import numpy as np
 import pytest
 from damageest_paths.clearance import Clearance
-from damageest_paths.loops import compile_loops
+from damageest_paths.compiling import compile_loops, run_loops
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.obstacles import Obstacles
 from hypothesis import given
@@ -89,3 +89,26 @@ def test_the_loops_are_compiled_where_no_folder_can_be_written(monkeypatch: pyte
         return one + other
 
     assert compile_loops(add)(1.0, 2.0) == 3.0
+
+
+@compile_loops
+def _double(value: float) -> float:
+    return 2 * value
+
+
+@compile_loops
+def _double_and_add(value: float) -> float:
+    return _double(value) + 1
+
+
+def test_the_loops_run_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatch) -> None:
+    saved = []
+
+    def refuse(*given: object) -> None:
+        saved.append(given)
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", refuse)
+    monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.load", lambda *given: None)
+    assert run_loops(_double_and_add, 3.0) == 7.0
+    assert len(saved) == 2
