@@ -17,6 +17,9 @@ ROOTS = 16
 BITS = 14
 """Digits of a point's place along each axis by which neighbours are found."""
 
+Tree = tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Singles, Floats]
+"""See `Boxes.tree`."""
+
 
 @dataclass(frozen=True, eq=False)
 class Boxes:
@@ -43,7 +46,7 @@ class Boxes:
     turn: Floats
 
     @property
-    def tree(self) -> tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Singles, Floats]:
+    def tree(self) -> Tree:
         """All as plain arrays, and how many boxes the first level has and each box holds, for `loops`."""
         sizes = np.array([self.roots, MEMBERS])
         return (

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Singles
+from damageest.artefacts import Flags, Floats, Ints
+from damageest_paths.boxes import Tree
 from damageest_paths.compiling import compile_loops
 
 CUTS = 9
@@ -22,8 +23,6 @@ DEPTH = 16
 LATER = 4096
 """Triangles of a pose that may wait to be cut until all others were looked at."""
 
-Tree = tuple[Floats, Floats, Floats, Floats, Floats, Ints, Ints, Ints, Singles, Floats]
-"""See `Boxes.tree`."""
 Open = tuple[Ints, Floats, Floats]
 """The boxes that are open: their numbers, a distance that all of each keeps, and that of its middle."""
 
