@@ -34,6 +34,11 @@ def find_sink(height: float, process: Process) -> float:
     return min(process.sink_share * height if process.sink is None else process.sink, (1 - FLUSH) * height)
 
 
+def measure_margin(standoff: float, process: Process) -> float:
+    """How far beside what is wanted of a layer metal counts."""
+    return 2 * process.bead.width + (process.beam.measure_radius(standoff) if process.beam else 0.0)
+
+
 def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: float, process: Process) -> Aims:
     """The aims of a layer between two heights.
 
@@ -50,7 +55,7 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     left, low, right, high = wanted.bounds() if not wanted.is_empty() else (0.0, 0.0, 0.0, 0.0)
     width = process.bead.width
     radius = min(width / 2, beam.radius)
-    margin = 2 * width + beam.measure_radius(standoff)
+    margin = measure_margin(standoff, process)
     extent = (right - left + 2 * margin, high - low + 2 * margin)
     plane = CrossSection.square(extent).translate((left - margin, low - margin))
     column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))

@@ -134,6 +134,10 @@ class _Work:
         width = self.process.bead.width
         # all layers are laid out before the first is filled: what cannot be followed is refused without that
         layers = self._lay_out(count, grid)
+        for number, (_, reach, patches) in enumerate(layers):
+            for patch in patches:
+                self._cover(patch, number, reach)
+        self._add_rest()
         for number, (sheet, reach, patches) in enumerate(layers):
             lines = [one.points for one in self.layer]
             lean = self.height * np.tan(self.process.overhang)
@@ -150,8 +154,6 @@ class _Work:
             before = self.passes[-1] if self.passes else None
             self.passes += order_passes(self.layer, before, self.standing.clearance, self.process)
             self._require_enough(most_lost)
-        self._add_rest()
-        self._require_enough(most_lost)
 
     def _require_enough(self, most_lost: float) -> None:
         if sum(self.volumes.values()) > most_lost * self.body.volume():
@@ -174,6 +176,14 @@ class _Work:
                 raise NotFollowedError(STEPS if steps > bends else BENDS)
             found.append((sheet, reach, unrolling.patches))
         return found
+
+    def _cover(self, patch: Patch, layer: int, reach: Floats) -> None:
+        """Notes what lies in a layer below what is wanted of it."""
+        width = self.process.bead.width
+        wider = shift_border(patch.draw_region(reach, self.process), GROWN * width)
+        if not wider.is_empty():
+            deep = self.height * (1 + DEEPER) if layer else FIRST * self.height
+            self.covered.append(patch.fill_below(wider, deep, width / 2))
 
     def _add_rest(self) -> None:
         """What no layer covers is missing too, as below the planes in which the floor goes on."""
@@ -204,10 +214,6 @@ class _Work:
         process = self.process
         wanted = patch.draw_region(reach, process)
         held = wanted ^ patch.draw_region(support, process)
-        wider = shift_border(wanted, GROWN * process.bead.width)
-        if not wider.is_empty():
-            deep = self.height * (1 + DEEPER) if layer else FIRST * self.height
-            self.covered.append(patch.fill_below(wider, deep, process.bead.width / 2))
         angle = process.angle + layer * process.turn
         lines = list_lines(held, process.pattern, process.bead, angle, None, process.shortest)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]

@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
-from damageest_paths.aims import Aims, find_aims, find_sink
+from damageest_paths.aims import Aims, find_aims, find_sink, measure_margin
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
 from damageest_paths.fill import SLIVER, WITHIN, Kind, Line, list_lines
@@ -38,6 +38,7 @@ UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
 OFF = 0.1
 """Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
 Z = np.array([0.0, 0.0, 1.0])
+UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,7 +62,6 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     low, high = local.bounding_box()[2], local.bounding_box()[5]
     count = max(1, int(np.ceil((high - low) / process.height - 1e-6)))
     height = (high - low) / count
-    near = _crop(metal, local, height + process.bead.width)
     meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
@@ -72,16 +72,21 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     reasons: dict[str, float] = {}
     choice = _AxisChoice(process, clearance)
     width = process.bead.width
+    # below, where the layer before was too thin over metal for a bead, metal is that much lower
+    under = max(height / 4, height - find_sink(height, process))
+    # of a large part little lies near, and of that the less the higher the layer
+    standoff = around.clearance.standoff
+    metal = _crop(metal, local, 2 * height, measure_margin(standoff, process), standoff + height)
+    above = local
     for number in range(count):
         floor, top = low + number * height, low + (number + 1) * height
-        slab = _cut_slab(local, floor, top)
+        above, slab = above.split_by_plane(UP, top)
         wanted = _cast_shadow(slab, process)
-        # below, where the layer before was too thin over metal for a bead, metal is that much lower
-        under = max(height / 4, height - find_sink(height, process))
-        ground = _cast_shadow(_cut_slab(near, floor - under, top), process)
+        metal = metal.trim_by_plane(UP, floor - under)
+        ground = _cast_shadow(metal.trim_by_plane(DOWN, -top), process)
         firm = shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         held = wanted ^ firm
-        aims = find_aims(metal, wanted, (floor, top), around.clearance.standoff, process)
+        aims = find_aims(metal, wanted, (floor, top), standoff, process)
         free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
         angle = process.angle + number * process.turn
         lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest, firm)
@@ -150,16 +155,13 @@ def _gather(pieces: list[Any]) -> Any:
     return Manifold.batch_boolean(pieces, OpType.Add) if pieces else None
 
 
-def _crop(metal: Any, body: Any, margin: float) -> Any:
-    """What lies of the metal in the box round the body."""
+def _crop(metal: Any, body: Any, under: float, beside: float, over: float) -> Any:
+    """What lies of the metal in the box round the body that is larger by this much below, beside and above it."""
     from manifold3d import Manifold
 
-    low, high = np.array(body.bounding_box()[:3]) - margin, np.array(body.bounding_box()[3:]) + margin
+    low = np.array(body.bounding_box()[:3]) - np.array([beside, beside, under])
+    high = np.array(body.bounding_box()[3:]) + np.array([beside, beside, over])
     return metal ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
-
-
-def _cut_slab(body: Any, floor: float, top: float) -> Any:
-    return body.trim_by_plane((0, 0, 1), floor).trim_by_plane((0, 0, -1), -top)
 
 
 def _cast_shadow(slab: Any, process: Process) -> Any:

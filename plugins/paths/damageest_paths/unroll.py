@@ -71,16 +71,17 @@ def _relax(places: Floats, faces: Ints, flat: Floats) -> Floats:
         matrix[1:, 1:].tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}, diag_pivot_thresh=0.0
     )
     origin = places.copy()
+    x, y = weight * sides[..., 0], weight * sides[..., 1]
+    begin, end = start.ravel(), stop.ravel()
     for _ in range(ROUNDS):
-        shown = places[start] - places[stop]
-        spin = np.einsum("fk,fki,fkj->fij", weight, shown, sides)
-        angle = np.arctan2(spin[:, 1, 0] - spin[:, 0, 1], spin[:, 0, 0] + spin[:, 1, 1])
-        c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
-        turned = np.stack([c * sides[..., 0] - s * sides[..., 1], s * sides[..., 0] + c * sides[..., 1]], axis=2)
-        pull = (weight[..., None] * turned).reshape(-1, 2)
-        right = np.zeros((count, 2))
-        for k in range(2):
-            right[:, k] = np.bincount(start.ravel(), pull[:, k], count) - np.bincount(stop.ravel(), pull[:, k], count)
+        across, up = places[start, 0] - places[stop, 0], places[start, 1] - places[stop, 1]
+        c, s = (across * x + up * y).sum(axis=1), (up * x - across * y).sum(axis=1)
+        length = np.hypot(c, s)
+        c = np.divide(c, length, out=np.ones_like(c), where=length > 0)[:, None]
+        s = np.divide(s, length, out=np.zeros_like(s), where=length > 0)[:, None]
+        right = np.empty((count, 2))
+        for k, pull in enumerate((c * x - s * y, s * x + c * y)):
+            right[:, k] = np.bincount(begin, pull.ravel(), count) - np.bincount(end, pull.ravel(), count)
         fresh = np.concatenate([np.zeros((1, 2)), solver.solve(right[1:])])
         fresh += places.mean(axis=0) - fresh.mean(axis=0)
         change = float(np.abs(fresh - places).max())
