@@ -4,17 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import cache
 from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
-from damageest_paths.conformal import BESIDE, LOST, plan_conformal
+from damageest_paths.conformal import LOST, plan_conformal
 from damageest_paths.frames import Frame, make_frame, make_unit
 from damageest_paths.obstacles import draw_passes
 from damageest_paths.planar import SUNK, Surroundings, plan_planar
 from damageest_paths.process import Plan, Process
+from damageest_paths.unfilled import BESIDE
 
 ENOUGH = 1e-3
 """Share of a body's volume below which what is missing is not worth another direction."""
@@ -77,18 +79,41 @@ def choose_direction(
 
     Layers along a floor take long: the first direction is kept where it leaves `LITTLE`, others are tried in planes.
     """
-    first = planner(body, make_frame(directions[0], origin), around, process)
-    volume = float(body.volume())
+    volume, frames = float(body.volume()), [make_frame(one, origin) for one in directions]
+
+    @cache
+    def try_all(trial: Planner) -> Floats:
+        return _try_directions(body, origin, directions, around, process, trial)
+
+    @cache
+    def plan_again(number: int) -> Plan:
+        return planner(body, frames[number], around, process)
+
+    def find_other(least: float) -> Plan | None:
+        if len(directions) == 1 or least - min(least, NO_REASON[BESIDE] * volume) <= LITTLE * volume:
+            return None
+        lost = try_all(plan_planar)
+        best = int(np.argmin(lost))
+        if best == 0 or lost[best] * volume > CLEARLY * least:
+            return None
+        other = plan_again(best)
+        return other if other.missing_volume < least else None
+
+    if planner is plan_conformal:
+        # where another direction leaves less than the first one's layers do not even cover, that is not filled
+        first = plan_conformal(body, frames[0], around, process, find_other=find_other)
+    else:
+        first = planner(body, frames[0], around, process)
     # where the first direction has no such layers, it is to be seen whether another has some
     in_planes = planner is plan_conformal and (bool(first.passes) or LOST in first.reasons)
     if len(directions) == 1 or _measure_worth(first, volume) <= (LITTLE if in_planes else ENOUGH) * volume:
         return first
-    lost = _try_directions(body, origin, directions, around, process, plan_planar if in_planes else planner)
+    lost = try_all(plan_planar if in_planes else planner)
     best = int(np.argmin(lost))
     # planes may lose far less than layers along the floor with the same direction, so the two are not compared closely
     if best == 0 or (in_planes and lost[best] * volume > CLEARLY * first.missing_volume):
         return first
-    other = planner(body, make_frame(directions[best], origin), around, process)
+    other = plan_again(best)
     return other if other.missing_volume < first.missing_volume else first
 
 

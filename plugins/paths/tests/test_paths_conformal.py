@@ -212,6 +212,17 @@ def test_layers_are_torn_at_a_low_step_and_what_has_no_bead_there_is_told() -> N
     assert beads + plan.missing_volume > 0.9 * scene.body.volume()
 
 
+def test_another_plan_is_asked_for_before_beads_are_laid() -> None:
+    """What no layer covers is known by then, and is the least that can be missing."""
+    scene = prepare(low_stair())
+    given = scene.body, scene.frame, scene.around, scene.process
+    asked: list[float] = []
+    plan = plan_conformal(*given, find_other=asked.append)
+    told = sum(volume for why, volume in plan.reasons.items() if "step" in why)
+    assert asked == [pytest.approx(told, rel=0.05)]
+    assert plan_conformal(*given, find_other=lambda least: plan) is plan
+
+
 def test_layers_that_would_leave_more_than_half_are_refused() -> None:
     """A deep slot: the nozzle does not come to its bottom, and what lies above has nothing to stand on."""
     narrow, wide = (cut(BLOCK, Manifold.cube((width, 60, 24)).translate((-width / 2, -30, -12))) for width in (4, 12))
