@@ -17,7 +17,7 @@ from damageest_paths.frames import Frame
 from damageest_paths.obstacles import COARSER, Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.patches import Patch, list_patches
-from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings
+from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal
 from damageest_paths.process import Pass, Plan, Process, extend_line
 from damageest_paths.regions import cover, measure_length, resample
 from damageest_paths.sheets import (
@@ -78,7 +78,8 @@ def plan_conformal(
     local, metal = frame.move(body), frame.move(around.metal)
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
     plan = Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
-    places, near = to_arrays(local.refine_to_length(process.bead.width))[0], _crop(metal, corners, process)
+    places, margin = to_arrays(local.refine_to_length(process.bead.width))[0], process.bead.width + 2 * process.height
+    near = Mesh(*to_arrays(crop_metal(metal, local, margin, margin, margin)))
     standing: Sweeps | None = None
     for floor, torn in list_floors(local, metal, process):
         standing = standing or _gather_metal(metal, frame, around, corners, process)
@@ -106,15 +107,6 @@ def _gather_metal(metal: Any, frame: Frame, around: Surroundings, corners: Float
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
     near = Obstacles(meshes, corners[0], corners[1], process.bead.width, coarser=COARSER)
     return Sweeps(around.clearance.with_obstacles(near))
-
-
-def _crop(metal: Any, corners: Floats, process: Process) -> Mesh:
-    """What lies of the metal in the box round the body."""
-    from manifold3d import Manifold
-
-    margin = process.bead.width + 2 * process.height
-    low, high = corners[0] - margin, corners[1] + margin
-    return Mesh(*to_arrays(metal ^ Manifold.cube(tuple(high - low)).translate(tuple(low))))
 
 
 @dataclass(eq=False)

@@ -89,15 +89,19 @@ def choose_direction(
     def plan_again(number: int) -> Plan:
         return planner(body, frames[number], around, process)
 
-    def find_other(least: float) -> Plan | None:
-        if len(directions) == 1 or least - min(least, NO_REASON[BESIDE] * volume) <= LITTLE * volume:
-            return None
-        lost = try_all(plan_planar)
+    def find_better(least: float, trial: Planner, share: float) -> Plan | None:
+        """The plan of another direction, if it leaves less than ``least``, and trials up to that share of it."""
+        lost = try_all(trial)
         best = int(np.argmin(lost))
-        if best == 0 or lost[best] * volume > CLEARLY * least:
+        if best == 0 or lost[best] * volume > share * least:
             return None
         other = plan_again(best)
         return other if other.missing_volume < least else None
+
+    def find_other(least: float) -> Plan | None:
+        if len(directions) == 1 or least - min(least, NO_REASON[BESIDE] * volume) <= LITTLE * volume:
+            return None
+        return find_better(least, plan_planar, CLEARLY)
 
     if planner is plan_conformal:
         # where another direction leaves less than the first one's layers do not even cover, that is not filled
@@ -108,13 +112,9 @@ def choose_direction(
     in_planes = planner is plan_conformal and (bool(first.passes) or LOST in first.reasons)
     if len(directions) == 1 or _measure_worth(first, volume) <= (LITTLE if in_planes else ENOUGH) * volume:
         return first
-    lost = try_all(plan_planar if in_planes else planner)
-    best = int(np.argmin(lost))
     # planes may lose far less than layers along the floor with the same direction, so the two are not compared closely
-    if best == 0 or (in_planes and lost[best] * volume > CLEARLY * first.missing_volume):
-        return first
-    other = plan_again(best)
-    return other if other.missing_volume < first.missing_volume else first
+    trial, share = (plan_planar, CLEARLY) if in_planes else (planner, np.inf)
+    return find_better(first.missing_volume, trial, share) or first
 
 
 def _try_directions(

@@ -76,7 +76,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     under = max(height / 4, height - find_sink(height, process))
     # of a large part little lies near, and of that the less the higher the layer
     standoff = around.clearance.standoff
-    metal = _crop(metal, local, 2 * height, measure_margin(standoff, process), standoff + height)
+    metal = crop_metal(metal, local, 2 * height, measure_margin(standoff, process), standoff + height)
     above = local
     for number in range(count):
         floor, top = low + number * height, low + (number + 1) * height
@@ -155,7 +155,7 @@ def _gather(pieces: list[Any]) -> Any:
     return Manifold.batch_boolean(pieces, OpType.Add) if pieces else None
 
 
-def _crop(metal: Any, body: Any, under: float, beside: float, over: float) -> Any:
+def crop_metal(metal: Any, body: Any, under: float, beside: float, over: float) -> Any:
     """What lies of the metal in the box round the body that is larger by this much below, beside and above it."""
     from manifold3d import Manifold
 
