@@ -11,6 +11,7 @@ from damageest_paths.regions import make_region, shift_border
 
 FLUSH = 0.02
 """Share of its radius by which a bead or beam may touch a wall beside it."""
+UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 SLICES = 4
 """Heights between bead and tip at which a widening beam is compared with the metal."""
 
@@ -39,12 +40,14 @@ def measure_margin(standoff: float, process: Process) -> float:
     return 2 * process.bead.width + (process.beam.measure_radius(standoff) if process.beam else 0.0)
 
 
-def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: float, process: Process) -> Aims:
+def find_aims(
+    metal: Any, beside: Any, wanted: Any, layer: tuple[float, float], standoff: float, process: Process
+) -> Aims:
     """The aims of a layer between two heights.
 
-    A bead may lie in metal, a Manifold, by the process's ``sink``. Above the layer the beam along z must not meet any,
-    but where the tool may be tilted: there each pose is looked at. ``wanted``: the region round which the metal counts.
-    Without a beam all is free.
+    A bead may lie in metal, a Manifold, by the process's ``sink``. ``beside``: what of it is no higher than the layer.
+    Above that the beam along z must not meet any, but where the tool may be tilted: there each pose is looked at.
+    ``wanted``: the region round which the metal counts. Without a beam all is free.
     """
     from manifold3d import CrossSection
 
@@ -58,14 +61,14 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
     margin = measure_margin(standoff, process)
     extent = (right - left + 2 * margin, high - low + 2 * margin)
     plane = CrossSection.square(extent).translate((left - margin, low - margin))
-    column = metal ^ plane.extrude(top + standoff - floor).translate((0, 0, floor))
     sink = find_sink(top - floor, process)
-    free = plane - shift_border(_shadow(column, floor + sink, top, process), (1 - FLUSH) * radius)
+    free = plane - shift_border(cast_shadow(beside.trim_by_plane(UP, floor + sink), process), (1 - FLUSH) * radius)
     # a ring half a bead within what is drawn lies within the free region, by a little; what it covers is reached
     reach = width / 2 * (1 - FLUSH / 2)
     flush = shift_border(free, reach)
     if process.axes == 5:
         return Aims(free, flush, flush, flush)
+    column = metal ^ plane.extrude(standoff).translate((0, 0, top))
     if beam.cone == 0:
         free -= shift_border(_shadow(column, top, top + standoff, process), (1 - FLUSH) * beam.radius)
     else:
@@ -79,7 +82,11 @@ def find_aims(metal: Any, wanted: Any, layer: tuple[float, float], standoff: flo
 
 def _shadow(metal: Any, low: float, high: float, process: Process) -> Any:
     """The outline, seen from above, of what lies of the metal between two heights."""
-    slab = metal.trim_by_plane((0, 0, 1), low).trim_by_plane((0, 0, -1), -high)
+    return cast_shadow(metal.trim_by_plane(UP, low).trim_by_plane(DOWN, -high), process)
+
+
+def cast_shadow(slab: Any, process: Process) -> Any:
+    """The outline of a slab, a Manifold, seen from above."""
     if slab.is_empty():
         return make_region([])
     return make_region(slab.project().to_polygons()).simplify(process.bead.width / 200)

@@ -159,7 +159,7 @@ class _Work:
             self._require_enough(most_lost)
 
     def _require_enough(self, most_lost: float) -> None:
-        if self.unfilled.volume > most_lost * self.body.volume():
+        if self.unfilled.volume > min(most_lost * self.body.volume(), self.process.give_up):
             raise NotFollowedError(LOST)
 
     def _list_layers(self, count: int) -> list[Layer]:

@@ -35,6 +35,8 @@ ROUGH = 0.1
 CLEARLY = 0.5
 """Share of what layers along a floor lose with the first direction, up to which planes may lose with another so that
 layers along the floor are planned for that one."""
+CLEARLY_WORSE = 0.002
+"""Share of a body's volume by which a trial has to lose more than the best one for it to be given up."""
 ALIKE = np.cos(np.radians(5.0))
 Planner = Callable[[Any, Frame, Surroundings, Process], Plan]
 
@@ -120,10 +122,15 @@ def choose_direction(
 def _try_directions(
     body: Any, origin: Floats, directions: Sequence[Floats], around: Surroundings, process: Process, planner: Planner
 ) -> Floats:
-    """The share of a body that is lost with each of the directions (N,), by trials with larger beads."""
-    coarse, rough = process.coarsen(COARSE), body.simplify(ROUGH * process.height)
-    lost = [planner(rough, make_frame(one, origin), around, coarse).missing_volume for one in directions]
-    return np.asarray(np.round(np.array(lost) / float(body.volume()), 3))
+    """The share of a body that is lost with each of the directions (N,), by trials with larger beads; about 1 where a
+    trial was given up because it loses more than another."""
+    coarse, rough, volume = process.coarsen(COARSE), body.simplify(ROUGH * process.height), float(body.volume())
+    lost: list[float] = []
+    for one in directions:
+        # one that is worse than the best so far shows it before its last layer
+        trial = replace(coarse, give_up=min(lost, default=np.inf) + CLEARLY_WORSE * volume)
+        lost.append(planner(rough, make_frame(one, origin), around, trial).missing_volume)
+    return np.asarray(np.round(np.array(lost) / volume, 3))
 
 
 def _measure_worth(plan: Plan, volume: float) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
-from damageest_paths.aims import Aims, find_aims, find_sink, measure_margin
+from damageest_paths.aims import DOWN, UP, Aims, cast_shadow, find_aims, find_sink, measure_margin
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
 from damageest_paths.fill import SLIVER, WITHIN, Kind, Line, list_lines
@@ -38,7 +38,6 @@ UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
 OFF = 0.1
 """Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
 Z = np.array([0.0, 0.0, 1.0])
-UP, DOWN = (0.0, 0.0, 1.0), (0.0, 0.0, -1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,38 +61,39 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     low, high = local.bounding_box()[2], local.bounding_box()[5]
     count = max(1, int(np.ceil((high - low) / process.height - 1e-6)))
     height = (high - low) / count
-    meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
-    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
-    corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
-    clearance = around.clearance.with_obstacles(Obstacles(meshes, corners[0], corners[1], process.bead.width))
     done = make_region([])
     passes: list[Pass] = []
     missing: list[Any] = []
     reasons: dict[str, float] = {}
-    choice = _AxisChoice(process, clearance)
+    choice: _AxisChoice | None = None
     width = process.bead.width
     # below, where the layer before was too thin over metal for a bead, metal is that much lower
     under = max(height / 4, height - find_sink(height, process))
     # of a large part little lies near, and of that the less the higher the layer
     standoff = around.clearance.standoff
-    metal = crop_metal(metal, local, 2 * height, measure_margin(standoff, process), standoff + height)
+    nearby = crop_metal(metal, local, 2 * height, measure_margin(standoff, process), standoff + height)
     above = local
     for number in range(count):
         floor, top = low + number * height, low + (number + 1) * height
         above, slab = above.split_by_plane(UP, top)
-        wanted = _cast_shadow(slab, process)
-        metal = metal.trim_by_plane(UP, floor - under)
-        ground = _cast_shadow(metal.trim_by_plane(DOWN, -top), process)
+        wanted = cast_shadow(slab, process)
+        nearby = nearby.trim_by_plane(UP, floor - under)
+        beside = nearby.trim_by_plane(DOWN, -top)
+        ground = cast_shadow(beside, process)
         firm = shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         held = wanted ^ firm
-        aims = find_aims(metal, wanted, (floor, top), standoff, process)
+        aims = find_aims(nearby, beside, wanted, (floor, top), standoff, process)
         free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
         angle = process.angle + number * process.turn
         lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest, firm)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
-        made, dropped, shaded = choice.place(long, top, number)
-        made = order_passes(made, passes[-1] if passes else None, clearance, process)
+        made, dropped, shaded = list[Pass](), list[Floats](), list[Floats]()
+        if long:
+            # what the nozzle must not touch is gathered for the first line: trials of what is left may have none
+            choice = choice or _AxisChoice(process, _gather_metal(local, metal, frame, around, process))
+            made, dropped, shaded = choice.place(long, top, number)
+            made = order_passes(made, passes[-1] if passes else None, choice.clearance, process)
         done = cover([one.points[:, :2] for one in made], width)
         causes = [cover(dropped, width), cover(shaded, width), short if made else wanted]
         held -= _find_hanging(held, wanted, aims, process)
@@ -116,7 +116,17 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
                 missing.append(piece)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
         passes += made
+        if sum(reasons.values()) > process.give_up:
+            return Plan(frame, height, (), local, reasons)
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
+
+
+def _gather_metal(local: Any, metal: Any, frame: Frame, around: Surroundings, process: Process) -> Clearance:
+    """The distances to what the nozzle must not touch: the metal in local coordinates, and the other meshes."""
+    meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
+    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
+    corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
+    return around.clearance.with_obstacles(Obstacles(meshes, corners[0], corners[1], process.bead.width))
 
 
 def _find_hanging(held: Any, wanted: Any, aims: Aims, process: Process) -> Any:
@@ -164,13 +174,6 @@ def crop_metal(metal: Any, body: Any, under: float, beside: float, over: float) 
     return metal ^ Manifold.cube(tuple(high - low)).translate(tuple(low))
 
 
-def _cast_shadow(slab: Any, process: Process) -> Any:
-    """The outline of a slab, seen from above."""
-    if slab.is_empty():
-        return make_region([])
-    return make_region(slab.project().to_polygons()).simplify(process.bead.width / 200)
-
-
 class _AxisChoice:
     """Places the lines of a layer with tool axes. It remembers which axis served last."""
 
@@ -191,7 +194,7 @@ class _AxisChoice:
         clearance, needed = self.clearance.above(top), self.process.gap
         made: list[Pass] = []
         dropped: list[Floats] = []
-        if not len(self.axes) or not lines:
+        if not len(self.axes):
             return made, [line.points for line in lines], dropped
         process = self.process
         least = int(np.ceil(process.shortest / process.step)) + 2

@@ -34,8 +34,10 @@ class Process:
     build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
-    ``is_trial``: few axes are tried. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None:
-    the share ``sink_share`` of the height of a layer. ``cooling``: see `Cooling`; None: beads need not cool down.
+    ``is_trial``: few axes are tried. ``give_up``: the volume from which on a trial need not go on if it misses that
+    much: all of the body is then said to be missing. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact
+    metal; None: the share ``sink_share`` of the height of a layer. ``cooling``: see `Cooling`; None: beads need not
+    cool down.
     """
 
     height: float
@@ -51,6 +53,7 @@ class Process:
     extend: tuple[float, float] = (0.0, 0.0)
     turn_rate: float = 0.0
     is_trial: bool = False
+    give_up: float = np.inf
     beam: Beam | None = None
     sink: float | None = None
     sink_share: float = 0.45

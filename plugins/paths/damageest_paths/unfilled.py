@@ -19,6 +19,8 @@ GROWN, DEEPER = 0.1, 0.5
 crease of the floor it is farther than one height to the layer below."""
 FIRST = 2.0
 """Layer heights by which the first layer is taken to reach down: to the floor wherever that is."""
+DETAIL = 0.01
+"""Share of a layer's height within which these bodies are simplified."""
 ROUGH = 0.02
 """Share of a bead's width within which the borders of what has no bead are simplified."""
 
@@ -46,7 +48,8 @@ class Unfilled:
         wider = shift_border(wanted, GROWN * self.width)
         if not wider.is_empty():
             deep = FIRST if is_first else 1 + DEEPER
-            self.covered.append(patch.fill_below(wider, deep * self.height, self.width / 2))
+            block = patch.fill_below(wider, deep * self.height, self.width / 2)
+            self.covered.append(block.simplify(DETAIL * self.height))
 
     def add_rest(self) -> None:
         """What no layer covers is missing too, as below the planes in which the floor goes on."""
@@ -76,7 +79,7 @@ class Unfilled:
             each = piece.volume() / sum(shares.values())
             for why, share in shares.items():
                 self.volumes[why] = self.volumes.get(why, 0.0) + each * share
-            self.pieces.append(_renew(piece))
+            self.pieces.append(_renew(piece.simplify(DETAIL * self.height)))
 
     def join(self) -> tuple[Any, dict[str, float]]:
         """All that is missing, as a Manifold, None for nothing; and the volume by reason."""
@@ -84,7 +87,7 @@ class Unfilled:
 
         if not self.pieces:
             return None, {}
-        whole = _renew(Manifold.batch_boolean(self.pieces, OpType.Add))
+        whole = _renew(Manifold.batch_boolean(self.pieces, OpType.Add).simplify(DETAIL * self.height))
         share = whole.volume() / self.volume
         return whole, {why: share * volume for why, volume in self.volumes.items()}
 
