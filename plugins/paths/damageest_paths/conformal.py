@@ -38,6 +38,8 @@ STEPS = "the floor of the cavity has steps, and no even layer goes over them"
 BENDS = "the layers bend too much both ways: beads laid side by side would lie far too close"
 MOST_LOST = 0.5
 """Share of a body of which layers along the floor may leave no more; another plan reaches little of so much."""
+UNCOVERED = 0.05
+"""Share of a body that no layer over a floor covers up to which this floor is followed before another is laid out."""
 LOST = "layers that follow the floor of the cavity would leave more than half of it without a bead"
 SPARE = 0.02
 """Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
@@ -81,6 +83,7 @@ def plan_conformal(
     places, margin = to_arrays(local.refine_to_length(process.bead.width))[0], process.bead.width + 2 * process.height
     near = Mesh(*to_arrays(crop_metal(metal, local, margin, margin, margin)))
     standing: Sweeps | None = None
+    waiting: list[tuple[_Work, list[Layer]]] = []
     for floor, torn in list_floors(local, metal, process):
         standing = standing or _gather_metal(metal, frame, around, corners, process)
         thickest = float(floor.measure(places).distance.max())
@@ -91,14 +94,28 @@ def plan_conformal(
         work = _Work(local, near, floor, standing, process, grid, corners, height, torn, unfilled)
         try:
             layers = work.lay_out(count)
-            other = find_other(unfilled.volume)
-            if other is not None:
-                return other
-            work.fill(layers, most_lost)
-            return Plan(frame, height, tuple(work.passes), *unfilled.join())
         except NotFollowedError as error:
-            plan = Plan(frame, height, (), local, {str(error): float(local.volume())})
+            plan = _refuse(frame, local, height, error)
+            continue
+        other = find_other(unfilled.volume)
+        if other is not None:
+            return other
+        if unfilled.volume > UNCOVERED * local.volume():
+            waiting.append((work, layers))
+            continue
+        plan = work.fill(frame, layers, most_lost)
+        if plan.passes:
+            return plan
+    # where all leave much uncovered, that which leaves least is filled first
+    for work, layers in sorted(waiting, key=lambda one: one[0].unfilled.volume):
+        plan = work.fill(frame, layers, most_lost)
+        if plan.passes:
+            return plan
     return plan
+
+
+def _refuse(frame: Frame, local: Any, height: float, error: NotFollowedError) -> Plan:
+    return Plan(frame, height, (), local, {str(error): float(local.volume())})
 
 
 def _gather_metal(metal: Any, frame: Frame, around: Surroundings, corners: Floats, process: Process) -> Sweeps:
@@ -137,8 +154,15 @@ class _Work:
         self.unfilled.add_rest()
         return layers
 
-    def fill(self, layers: Sequence[Layer], most_lost: float) -> None:
-        """Plans the passes of the layers. Raises NotFollowedError where that leaves too much."""
+    def fill(self, frame: Frame, layers: Sequence[Layer], most_lost: float) -> Plan:
+        """The plan with the passes of the layers; without any where these leave too much."""
+        try:
+            self._fill_layers(layers, most_lost)
+        except NotFollowedError as error:
+            return _refuse(frame, self.body, self.height, error)
+        return Plan(frame, self.height, tuple(self.passes), *self.unfilled.join())
+
+    def _fill_layers(self, layers: Sequence[Layer], most_lost: float) -> None:
         self._require_enough(most_lost)
         width = self.process.bead.width
         for number, (sheet, reach, patches) in enumerate(layers):

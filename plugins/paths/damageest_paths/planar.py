@@ -111,7 +111,8 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
             rest = region - done
             if rest.is_empty():
                 continue
-            piece = slab ^ rest.extrude(top - floor).translate((0, 0, floor))
+            column = rest.extrude(top - floor).translate((0, 0, floor))
+            piece = slab if (wanted - rest).is_empty() else slab ^ column
             if piece.volume() > 0:
                 missing.append(piece)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
