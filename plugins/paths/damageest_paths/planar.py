@@ -118,6 +118,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
         passes += made
         if sum(reasons.values()) > process.give_up:
+            # what the layers above would fill is of no interest any more
             return Plan(frame, height, (), local, reasons)
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
 

@@ -34,10 +34,9 @@ class Process:
     build direction and an overhanging side. ``shortest``: least length of a pass. ``gap``: distance that the nozzle has
     to keep. ``tilt``: largest of the tool axis against the build direction. ``extend``: how far a pass begins before
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
-    ``is_trial``: few axes are tried. ``give_up``: the volume from which on a trial need not go on if it misses that
-    much. ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact
-    metal; None: the share ``sink_share`` of the height of a layer. ``cooling``: see `Cooling`; None: beads need not
-    cool down.
+    ``is_trial``: few axes are tried. ``give_up``: the volume from which on a trial need not go on if it misses more.
+    ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None: the share ``sink_share`` of the
+    height of a layer. ``cooling``: see `Cooling`; None: beads need not cool down.
     """
 
     height: float
