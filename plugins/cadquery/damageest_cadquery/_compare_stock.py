@@ -64,7 +64,8 @@ def compare_stock(
     stock = stock - whole if entered else stock
     difference = (stock.volume() - deposit.stock_volume) / deposit.volume
     outside = np.flatnonzero(~find_inner_faces(lost, part))
-    wider = _compare_outlines(bases, lost, outside, part) / deposit.volume
+    skin = _leave_touching(lost, outside, part, tolerance)
+    wider = _compare_outlines(bases, lost, skin, part) / deposit.volume
     curved = sum(measure_area(face) for solid in parts for face in explore_faces(solid) if not is_plane(face))
     room = VOLUME + part.tessellation_error * curved / deposit.volume
     fault: StockError | None = None
@@ -78,23 +79,28 @@ def compare_stock(
             _find_worst(stock, deposit, part, tolerance, origin),
         )
     if fault is not None:
-        plain = abs(difference) <= EXPLAINED and is_plain(
-            deposit, lost, outside, part, tolerance, VOLUME * deposit.volume
-        )
+        plain = abs(difference) <= EXPLAINED and is_plain(deposit, lost, skin, part, tolerance, VOLUME * deposit.volume)
         own = build_own_stock(damage, deposit, whole if entered else None, tolerance) if plain else None
         if own is None or not _is_same(stock, own, room, deposit, part, tolerance):
             raise fault
     return distance, farthest, difference
 
 
+def _leave_touching(lost: Solid, outside: Ints, part: Part, tolerance: float) -> Ints:
+    """The faces ``outside`` (F,) of ``lost`` without those that touch another solid of the part: they get no stock, and
+    the CAD face nearest to them may be that of the other solid."""
+    above = lost.triangles[outside].mean(axis=1) + tolerance / 8 * lost.face_normals[outside]
+    return outside[~is_inside(above, part)]
+
+
 def lower_stock(deposit: Deposit, lost: Solid, part: Part, tolerance: float) -> Deposit | None:
     """The mesh's deposit with stock that is a quarter of the tolerance lower: of the height that the job asks for. None
     where something took stock away, so that it cannot be built anew."""
-    outside = np.flatnonzero(~find_inner_faces(lost, part))
-    if not is_plain(deposit, lost, outside, part, tolerance, VOLUME * deposit.volume):
+    skin = _leave_touching(lost, np.flatnonzero(~find_inner_faces(lost, part)), part, tolerance)
+    if not is_plain(deposit, lost, skin, part, tolerance, VOLUME * deposit.volume):
         return None
     origin = deposit.bounds.mean(axis=0)
-    stock = build_plain(deposit, lost, outside, part, tolerance, tolerance / 4)
+    stock = build_plain(deposit, lost, skin, part, tolerance, tolerance / 4)
     vertices, triangles = to_arrays(stock + to_manifold(lost, origin))
     return Deposit(vertices + origin, triangles, heights=deposit.heights, stock_volume=stock.volume())
 
