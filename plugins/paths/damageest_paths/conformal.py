@@ -17,7 +17,7 @@ from damageest_paths.frames import Frame
 from damageest_paths.obstacles import COARSER, Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.patches import Patch, list_patches
-from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal
+from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
 from damageest_paths.process import Pass, Plan, Process, extend_line
 from damageest_paths.regions import cover, measure_length, resample
 from damageest_paths.sheets import (
@@ -85,7 +85,7 @@ def plan_conformal(
     standing: Sweeps | None = None
     waiting: list[tuple[_Work, list[Layer]]] = []
     for floor, torn in list_floors(local, metal, process):
-        standing = standing or _gather_metal(metal, frame, around, corners, process)
+        standing = standing or Sweeps(gather_metal(metal, local, frame, around, process, COARSER))
         thickest = float(floor.measure(places).distance.max())
         count = max(1, int(np.ceil(thickest / process.height - SPARE)))
         height = min(thickest / count, process.height)
@@ -116,14 +116,6 @@ def plan_conformal(
 
 def _refuse(frame: Frame, local: Any, height: float, error: NotFollowedError) -> Plan:
     return Plan(frame, height, (), local, {str(error): float(local.volume())})
-
-
-def _gather_metal(metal: Any, frame: Frame, around: Surroundings, corners: Floats, process: Process) -> Sweeps:
-    """What the nozzle must not touch: the metal, a Manifold in local coordinates, and the other meshes."""
-    meshes = [Mesh(*to_arrays(metal))]
-    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
-    near = Obstacles(meshes, corners[0], corners[1], process.bead.width, coarser=COARSER)
-    return Sweeps(around.clearance.with_obstacles(near))
 
 
 @dataclass(eq=False)

@@ -91,7 +91,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         made, dropped, shaded = list[Pass](), list[Floats](), list[Floats]()
         if long:
             # what the nozzle must not touch is gathered for the first line: trials of what is left may have none
-            choice = choice or _AxisChoice(process, _gather_metal(local, metal, frame, around, process))
+            choice = choice or _AxisChoice(process, gather_metal(metal, local, frame, around, process))
             made, dropped, shaded = choice.place(long, top, number)
             made = order_passes(made, passes[-1] if passes else None, choice.clearance, process)
         done = cover([one.points[:, :2] for one in made], width)
@@ -111,8 +111,8 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
             rest = region - done
             if rest.is_empty():
                 continue
-            column = rest.extrude(top - floor).translate((0, 0, floor))
-            piece = slab if (wanted - rest).is_empty() else slab ^ column
+            is_whole = (wanted - rest).is_empty()
+            piece = slab if is_whole else slab ^ rest.extrude(top - floor).translate((0, 0, floor))
             if piece.volume() > 0:
                 missing.append(piece)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()
@@ -123,12 +123,15 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
 
 
-def _gather_metal(local: Any, metal: Any, frame: Frame, around: Surroundings, process: Process) -> Clearance:
-    """The distances to what the nozzle must not touch: the metal in local coordinates, and the other meshes."""
+def gather_metal(
+    metal: Any, body: Any, frame: Frame, around: Surroundings, process: Process, coarser: float = 1.0
+) -> Clearance:
+    """The distances, near a body, to what the nozzle must not touch: the metal, both Manifolds in local coordinates,
+    and the other meshes. ``coarser``: see `Obstacles`."""
     meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
     meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
-    corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
-    return around.clearance.with_obstacles(Obstacles(meshes, corners[0], corners[1], process.bead.width))
+    box = np.array(body.bounding_box())
+    return around.clearance.with_obstacles(Obstacles(meshes, box[:3], box[3:], process.bead.width, coarser=coarser))
 
 
 def _find_hanging(held: Any, wanted: Any, aims: Aims, process: Process) -> Any:

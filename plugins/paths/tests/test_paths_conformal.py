@@ -5,11 +5,10 @@ from __future__ import annotations
 from functools import cache
 from typing import Any, cast
 
-import damageest_paths.conformal
 import numpy as np
 import pytest
 from damageest_paths.conformal import plan_conformal
-from damageest_paths.floor import Depth, Floor, make_floor
+from damageest_paths.floor import Depth, Floor
 from damageest_paths.planar import plan_planar
 from damageest_paths.process import Pass, Plan
 from damageest_paths.regions import measure_length
@@ -222,36 +221,6 @@ def test_another_plan_is_asked_for_before_beads_are_laid() -> None:
     told = sum(volume for why, volume in plan.reasons.items() if "step" in why)
     assert asked == [pytest.approx(told, rel=0.05)]
     assert plan_conformal(*given, find_other=lambda least: plan) is plan
-
-
-def test_of_floors_that_leave_much_uncovered_the_one_that_leaves_least_is_filled(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    scene = prepare(stair())
-    whole = scene.floor.mesh
-    upper = whole.triangles[:, :, 2].mean(axis=1) > 0
-    floors = [
-        make_floor(whole.vertices + np.array([0.0, 0.0, raised]), whole.faces[some], scene.process.bead.width)
-        for some, raised in ((upper, 0.5), (upper, 0.0), (~upper, 0.0))
-    ]
-    uncovered: list[float] = []
-
-    def plan_over(some: list[Floor]) -> Plan:
-        monkeypatch.setattr(damageest_paths.conformal, "list_floors", lambda *_: iter([(one, 1.0) for one in some]))
-        uncovered.clear()
-        return plan_conformal(scene.body, scene.frame, scene.around, scene.process, 1.0, uncovered.append)
-
-    plan_over(floors[:2])
-    assert uncovered[0] > 1.1 * uncovered[1] > 0.1 * scene.body.volume()
-    wanted = plan_over([floors[1]])
-    for some in (floors[:2], floors[1::-1]):
-        plan = plan_over(some)
-        assert len(uncovered) == 2
-        assert plan.missing_volume == wanted.missing_volume
-        assert len(plan.passes) == len(wanted.passes)
-    # one that leaves little is filled at once
-    assert plan_over(floors[::-1]).missing_volume < 0.1 * scene.body.volume() < wanted.missing_volume
-    assert len(uncovered) == 1
 
 
 def test_layers_that_would_leave_more_than_half_are_refused() -> None:

@@ -1,11 +1,14 @@
-"""Trials of build directions: one that is given up changes nothing."""
+"""Directions and floors that are tried: a trial that is given up changes nothing, and the order of floors does not."""
 
 from __future__ import annotations
 
+import damageest_paths.conformal
 import damageest_paths.directions
 import numpy as np
 import pytest
+from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import choose_direction
+from damageest_paths.floor import Floor, make_floor
 from damageest_paths.frames import Frame
 from damageest_paths.planar import Surroundings, plan_planar
 from damageest_paths.process import Plan, Process
@@ -48,3 +51,33 @@ def test_trials_given_up_are_those_of_no_chosen_direction(loss: Loss, monkeypatc
             assert some[one] == every[one]
     assert (plan.frame.direction == whole.frame.direction).all()
     assert plan.missing_volume == whole.missing_volume
+
+
+def test_of_floors_that_leave_much_uncovered_the_one_that_leaves_least_is_filled(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = prepare(stair())
+    whole = scene.floor.mesh
+    upper = whole.triangles[:, :, 2].mean(axis=1) > 0
+    floors = [
+        make_floor(whole.vertices + np.array([0.0, 0.0, raised]), whole.faces[some], scene.process.bead.width)
+        for some, raised in ((upper, 0.5), (upper, 0.0), (~upper, 0.0))
+    ]
+    uncovered: list[float] = []
+
+    def plan_over(some: list[Floor]) -> Plan:
+        monkeypatch.setattr(damageest_paths.conformal, "list_floors", lambda *_: iter([(one, 1.0) for one in some]))
+        uncovered.clear()
+        return plan_conformal(scene.body, scene.frame, scene.around, scene.process, 1.0, uncovered.append)
+
+    plan_over(floors[:2])
+    assert uncovered[0] > 1.1 * uncovered[1] > 0.1 * scene.body.volume()
+    wanted = plan_over([floors[1]])
+    for some in (floors[:2], floors[1::-1]):
+        plan = plan_over(some)
+        assert len(uncovered) == 2
+        assert plan.missing_volume == wanted.missing_volume
+        assert len(plan.passes) == len(wanted.passes)
+    # one that leaves little is filled at once
+    assert plan_over(floors[::-1]).missing_volume < 0.1 * scene.body.volume() < wanted.missing_volume
+    assert len(uncovered) == 1
