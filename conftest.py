@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shutil
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,13 +11,28 @@ import numpy as np
 import pytest
 import trimesh
 
+import damageest
 from damageest.registry import Registry
+from damageest.result import Result
+from tests import damaged_box
+from tests.kept import keep
+
+pytest_plugins = ["tests.costs"]
+
+
+@pytest.fixture(scope="session")
+def test_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder that all processes of one run of pytest share."""
+    own = tmp_path_factory.getbasetemp()
+    folder = (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "shared"
+    folder.mkdir(exist_ok=True)
+    return folder
 
 
 @pytest.fixture(scope="session", autouse=True)
-def part_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
-    """What is kept of parts goes to a folder of the session, not to the user's."""
-    folder = tmp_path_factory.mktemp("kept") / "parts"
+def part_store(test_run: Path) -> Iterator[Path]:
+    """What is kept of parts goes to a folder of the run, not to the user's."""
+    folder = test_run / "parts"
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("DAMAGEEST_CACHE", str(folder))
         yield folder
@@ -24,6 +41,32 @@ def part_store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
 @pytest.fixture(scope="session")
 def registry() -> Registry:
     return Registry.discover()
+
+
+@pytest.fixture(scope="session")
+def _small_job(test_run: Path, registry: Registry) -> Path:
+    def make(folder: Path) -> None:
+        damageest.run(damaged_box.write_small(folder), registry=registry, output=True)
+
+    return keep(test_run, "small_job", make)
+
+
+@pytest.fixture
+def small_done(_small_job: Path, tmp_path: Path) -> Path:
+    """The job of `damaged_box.write_small` in ``tmp_path``, with its finished output folder ``out/job``.
+
+    It is computed once a run of pytest; each test has a copy of its own.
+    """
+    shutil.copytree(_small_job, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "job.yaml"
+
+
+@pytest.fixture(scope="session")
+def small_result(_small_job: Path, tmp_path_factory: pytest.TempPathFactory, registry: Registry) -> Result:
+    """What `damageest.run` gives for that job, from its kept stages. Nobody changes it."""
+    folder = tmp_path_factory.mktemp("small_result")
+    shutil.copytree(_small_job, folder, dirs_exist_ok=True)
+    return damageest.run(folder / "job.yaml", registry=registry, output=True)
 
 
 @pytest.fixture

@@ -1,0 +1,124 @@
+"""A plugin of pytest: the processor seconds of each test, those of its child processes included.
+
+A run ends with the ten dearest of the default tests. With ``--dear-fails`` (CI), those above `MOST` are run again,
+alone and without coverage, and the run fails where one is above it a second time. What a fixture takes that several
+tests share is not counted: it is not the fault of the test that comes first.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Generator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+MOST = 2.0
+"""Processor seconds that a default test may take."""
+SHOWN = 10
+LATER = ("slow", "nightly")
+"""Marks of the tests that the default run leaves out."""
+COSTS: dict[str, float] = {}
+"""Processor seconds by test, gathered where reports come together."""
+_START = pytest.StashKey[tuple[float, float]]()
+_shared = 0.0  # seconds of fixtures that several tests share, so far
+
+
+def count_processor_seconds() -> float:
+    """Seconds of this process and of all below it, those that have ended included."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system + _count_living(os.getpid())
+
+
+def _count_living(process: int) -> float:
+    """Seconds of the living processes below one; 0 where the system does not say which they are."""
+    seconds = 0.0
+    for threads in Path(f"/proc/{process}/task").glob("*/children"):
+        try:
+            for child in map(int, threads.read_text().split()):
+                told = Path(f"/proc/{child}/stat").read_text().rsplit(")", 1)[1].split()
+                seconds += sum(map(int, told[11:15])) / os.sysconf("SC_CLK_TCK") + _count_living(child)
+        except OSError:  # it has just ended
+            continue
+    return seconds
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    parser.addoption(
+        "--dear-fails", action="store_true", help=f"fail where a default test takes more than {MOST} s twice"
+    )
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_fixture_setup(fixturedef: Any) -> Generator[None, Any, Any]:
+    global _shared
+    if fixturedef.scope == "function":
+        return (yield)
+    start, before = count_processor_seconds(), _shared
+    try:
+        return (yield)
+    finally:  # what the fixtures that it asks for take is counted already
+        _shared += count_processor_seconds() - start - (_shared - before)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
+    item.stash[_START] = count_processor_seconds(), _shared
+    return (yield)
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
+    report = yield
+    if call.when == "teardown" and not any(item.get_closest_marker(name) for name in LATER):
+        start, shared = item.stash[_START]
+        report.user_properties.append(("processor_seconds", count_processor_seconds() - start - (_shared - shared)))
+    return report
+
+
+def pytest_runtest_logreport(report: pytest.TestReport) -> None:
+    if report.when == "teardown":
+        COSTS.update((report.nodeid, value) for name, value in report.user_properties if name == "processor_seconds")
+
+
+def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
+    dearest = sorted(COSTS.items(), key=lambda one: -one[1])[:SHOWN]
+    if len(COSTS) > SHOWN:
+        terminalreporter.section(f"the {SHOWN} dearest of {len(COSTS)} default tests, in processor seconds")
+        for name, seconds in dearest:
+            terminalreporter.write_line(f"{seconds:6.2f}  {name}")
+    for name in config.stash.get(_DEAR, ()):
+        terminalreporter.write_line(
+            f"{name} took more than {MOST} s of processor time twice: make it cheaper, or mark it slow"
+        )
+
+
+_DEAR = pytest.StashKey[tuple[str, ...]]()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
+    config = session.config
+    dear = [name for name, seconds in COSTS.items() if seconds > MOST]
+    if exitstatus or not dear or hasattr(config, "workerinput") or not config.getoption("--dear-fails"):
+        return
+    config.stash[_DEAR] = tuple(find_dear_again(dear, config.rootpath))
+    if config.stash[_DEAR]:
+        session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+
+def find_dear_again(names: list[str], root: Path) -> list[str]:
+    """Runs tests again, alone, and gives those that are above `MOST` again.
+
+    They run twice in one process, and the second time counts: the first one imports libraries.
+    """
+    code = (
+        "import sys, pytest; from tests import costs\n"
+        "for _ in range(2): pytest.main(['-q', '-n', '0', '--no-cov', *sys.argv[1:]], plugins=[])\n"
+        "print(*(name for name, seconds in costs.COSTS.items() if seconds > costs.MOST), sep='\\n')"
+    )
+    done = subprocess.run([sys.executable, "-c", code, *names], cwd=root, capture_output=True, text=True, check=False)
+    return [line for line in done.stdout.splitlines() if line in names]
