@@ -39,6 +39,7 @@ def damageest_stages() -> list[type[Stage]]:
     from damageest.stages.boundary.largest_loop import LargestLoop
     from damageest.stages.cluster.dbscan import Dbscan
     from damageest.stages.enclose.adaptive import Adaptive
+    from damageest.stages.enclose.divide import Divide
     from damageest.stages.enclose.implicit import Implicit
     from damageest.stages.enclose.shortest_path import ShortestPath
     from damageest.stages.export.files import Files
@@ -61,7 +62,7 @@ def damageest_stages() -> list[type[Stage]]:
     return [
         PartFile, ScanFile, Simulate, EdgeAware, Register, Icp, Constrained, KnownPose, Points, NoAdapt, Smooth,
         AutoAdapt, MeshDistance, Dbscan, PyVista, LargestLoop, AllLoops, Offset, BoundingBox, Capsule,
-        CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Implicit,
+        CylinderBackground, Minkowski, BuildVolume, ShortestPath, Adaptive, Divide, Implicit,
         NoRepair, Manifold, NoAllowance, Milling, NoPath, Files, Uniform, CloudDistance, SignedDistance,
         PartFromScan, EarlierScan, Html, NoReport,
     ]  # fmt: skip

@@ -44,7 +44,7 @@ def close_enclosure(
     vertices = np.concatenate([wide.vertices, background.vertices])
     strips = [build_strip(loop, path, start) for loop, path in zip(wide.loops, paths, strict=True)]
     if (
-        share := _measure_through(Mesh(vertices, np.concatenate(strips)), part, tolerance) / surface.area
+        share := measure_through(Mesh(vertices, np.concatenate(strips)), part, tolerance) / surface.area
     ) > MOST_THROUGH:
         raise StageError(
             f"the strip from the rim to the background runs through the part (area: {share:.0%} of the damage surface)",
@@ -114,7 +114,7 @@ def orient_by_intact(surface: Surface, rims: Rims, intact: Floats) -> tuple[Surf
     return Surface(surface.vertices, faces), Rims(loops)
 
 
-def _measure_through(strips: Mesh, part: Part, tolerance: float) -> float:
+def measure_through(strips: Mesh, part: Part, tolerance: float) -> float:
     """Area of the strips that lies inside the part, deeper than twice the tolerance."""
     from damageest.geometry.distance import signed_distance
 
