@@ -12,6 +12,7 @@ from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.solids import compose_shells, to_arrays, to_manifold
 from damageest.stages.enclose import NotSeparatedError
+from damageest.stages.enclose._outside import Sheet
 
 THIN = 2e-4
 """Half of the thickness of the cut, in tolerances."""
@@ -22,14 +23,22 @@ MOST_INTACT = 0.02
 LEAST_DIFFERENCE = 0.1
 """By how much the shares of intact points on the two sides must differ."""
 MOST_ASKED = 4000
+"""Intact points that are looked at."""
+BESIDE = 3.0
+"""Distance from the damage surface, in tolerances, from which an intact point tells the side."""
+LEAST_AREA = 1e-6
+"""Area of a body on the damage surface, as a share of that, from which it touches it."""
+OPENED = (1.1, 1.6, 2.4, 3.6)
+"""How wide the metal is opened where the border of the sheet lies in the part, in depths, one after the other until
+the two sides are apart. Where the wall beside it is thin, its last bit has no border."""
 
 
-def divide_part(part: Part, sheet: Mesh, own: int, intact: Floats, side: str, tolerance: float) -> tuple[Any, Any]:
+def divide_part(part: Part, sheet: Sheet, intact: Floats, side: str, tolerance: float) -> tuple[Any, Any]:
     """The lost metal and what is left, as Manifolds relative to the middle of the part's bounds.
 
     Args:
         part: as designed.
-        sheet: the damage surface, extended until it ends outside the part; its first ``own`` faces are the surface.
+        sheet: the damage surface, extended until it ends outside the part.
         intact: (K,3) points on the intact skin, in the part's frame.
         side: auto, smaller or larger.
         tolerance: in the part's unit.
@@ -37,18 +46,20 @@ def divide_part(part: Part, sheet: Mesh, own: int, intact: Floats, side: str, to
     Raises NotSeparatedError where the surface does not divide the part; StageError where the side is not shown.
     """
     origin = part.bounds.mean(axis=0)
-    body = to_manifold(part, origin)
-    bodies = (body - to_manifold(thicken(sheet, THIN * tolerance), origin)).decompose()
-    meshes = [Mesh(*to_arrays(one, origin)) for one in bodies]
-    area = np.array([_measure_sides(mesh, sheet, own, tolerance) for mesh in meshes])
-    touched = area.sum(axis=1) > 1e-6 * part.area
-    if len(bodies) < 2 or (np.minimum(area[:, 0], area[:, 1]) > MOST_BOTH * area.sum(axis=1))[touched].any():
+    body = to_manifold(part, origin) - to_manifold(thicken(sheet.mesh, THIN * tolerance), origin)
+    for wide in OPENED if len(sheet.places) else OPENED[:1]:
+        bodies = (body - _make_balls(sheet.places - origin, wide * sheet.deep)).decompose()
+        meshes = [Mesh(*to_arrays(one, origin)) for one in bodies]
+        area = np.array([_measure_sides(mesh, sheet, tolerance) for mesh in meshes])
+        touched = area.sum(axis=1) > LEAST_AREA * sheet.mesh.area
+        if not (area[touched].min(axis=1) > MOST_BOTH * area[touched].sum(axis=1)).any():
+            break
+    else:
         raise NotSeparatedError("the damage surface does not divide the part in two", method="implicit")
-    front = touched & (area[:, 0] >= area[:, 1])
-    back = touched & ~front
+    front, back = touched & (area[:, 0] > area[:, 1]), touched & (area[:, 0] <= area[:, 1])
     if not front.any() or not back.any():
         raise NotSeparatedError("the damage surface cuts nothing off the part", method="implicit")
-    lost = _choose_side(part, meshes, bodies, front, back, intact, side, sheet, tolerance)
+    lost = (front, back)[_choose_side(meshes, bodies, (front, back), intact, side, sheet, tolerance)]
     return _unite(bodies, lost), _unite(bodies, ~lost)
 
 
@@ -65,46 +76,53 @@ def thicken(sheet: Mesh, half: float) -> Mesh:
     return Mesh(vertices, np.concatenate(faces))
 
 
+def _make_balls(places: Floats, radius: Floats) -> Any:
+    """Balls round the places (K,3) where the border of the sheet still lies in the part: they open the metal between
+    it and the outside, which would join the two sides of the sheet. A ball that others nearly hold is left out."""
+    from manifold3d import Manifold, OpType
+
+    kept: list[int] = []
+    for number in np.argsort(-radius).tolist():
+        gap = np.linalg.norm(places[kept] - places[number], axis=1)
+        if not (gap < 0.4 * radius[kept]).any():
+            kept.append(number)
+    balls = [Manifold.sphere(float(radius[k]), 16).translate(tuple(places[k])) for k in kept]
+    return Manifold.batch_boolean(balls or [Manifold()], OpType.Add)
+
+
 def _measure_vertex_normals(sheet: Mesh) -> Floats:
     total = np.zeros_like(sheet.vertices)
     unit = sheet.cross / np.maximum(np.linalg.norm(sheet.cross, axis=1), 1e-300)[:, None]
     for corner in range(3):
         np.add.at(total, sheet.faces[:, corner], unit)
-    return total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None]
+    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])
 
 
-def _measure_sides(mesh: Mesh, sheet: Mesh, own: int, tolerance: float) -> tuple[float, float]:
-    """Areas of a body's faces on the front and on the back of the damage surface, on its own faces alone."""
-    middle = mesh.triangles.mean(axis=1)
-    distance, face, _ = closest_on_mesh(middle, sheet)
-    at = np.flatnonzero((distance < 3 * THIN * tolerance) & (face < own))
-    lean = np.einsum("ij,ij->i", mesh.cross[at], sheet.cross[face[at]])
-    area = np.linalg.norm(mesh.cross[at], axis=1) / 2
-    size = np.linalg.norm(mesh.cross[at], axis=1) * np.linalg.norm(sheet.cross[face[at]], axis=1)
-    along = lean > 0.9 * size
-    against = lean < -0.9 * size
-    return float(area[against].sum()), float(area[along].sum())
+def _measure_sides(mesh: Mesh, sheet: Sheet, tolerance: float) -> tuple[float, float]:
+    """The area of a body's faces on the front and on the back of the damage surface, without what extends it."""
+    distance, face, _ = closest_on_mesh(mesh.triangles.mean(axis=1), sheet.mesh)
+    at = np.flatnonzero((distance < 3 * THIN * tolerance) & (face < sheet.own))
+    own, other = mesh.cross[at], sheet.mesh.cross[face[at]]
+    size = np.linalg.norm(own, axis=1)
+    lean = np.einsum("ij,ij->i", own, other) / np.maximum(size * np.linalg.norm(other, axis=1), 1e-300)
+    return float(size[lean < -0.9].sum() / 2), float(size[lean > 0.9].sum() / 2)
 
 
 def _choose_side(
-    part: Part, meshes: list[Mesh], bodies: list[Any], front: Flags, back: Flags, intact: Floats, side: str,
-    sheet: Mesh, tolerance: float,
-) -> Flags:  # fmt: skip
-    volume = np.array([one.volume() for one in bodies])
+    meshes: list[Mesh], bodies: list[Any], sides: tuple[Flags, Flags], intact: Floats, side: str, sheet: Sheet,
+    tolerance: float,
+) -> int:  # fmt: skip
+    """0 where the bodies of the first side are lost, 1 for the second one."""
     if side != "auto":
-        smaller = volume[front].sum() < volume[back].sum()
-        return front if smaller == (side == "smaller") else back
+        volume = np.array([one.volume() for one in bodies])
+        return int((volume[sides[0]].sum() < volume[sides[1]].sum()) != (side == "smaller"))
     few = intact[:: max(1, len(intact) // MOST_ASKED)]
+    if len(few):  # points beside the rim may lie on either side
+        few = few[closest_on_mesh(few, sheet.mesh)[0] > BESIDE * tolerance]
+    shares = [0.0, 0.0]
     if len(few):
-        away, _, _ = closest_on_mesh(few, sheet)
-        few = few[away > 3 * tolerance]
-    nearest = np.full(len(few), np.inf)
-    owner = np.full(len(few), -1)
-    for number, mesh in enumerate(meshes):
-        distance, _, _ = closest_on_mesh(few, mesh) if len(few) else (np.empty(0), None, None)
-        better = distance < nearest
-        nearest[better], owner[better] = distance[better], number
-    shares = [float(np.isin(owner, np.flatnonzero(one)).mean()) if len(few) else 0.0 for one in (front, back)]
+        owner = np.argmin([closest_on_mesh(few, mesh)[0] for mesh in meshes], axis=0)
+        shares = [float(one[owner].mean()) for one in sides]
     best = int(np.argmin(shares))
     if shares[best] > MOST_INTACT:
         raise NotSeparatedError(
@@ -117,7 +135,7 @@ def _choose_side(
             "enclose: {use: divide, side: smaller} or side: larger, where you know",
             method="implicit",
         )
-    return (front, back)[best]
+    return best
 
 
 def _unite(bodies: list[Any], which: Flags) -> Any:

@@ -26,15 +26,15 @@ def join_room(lost: Any, left: Any, background: Solid, part: Part) -> Mesh:
     own, rest = (Mesh(*to_arrays(one, origin)) for one in (lost, left))
     low, high = background.bounds
     cell = float((high - low).max()) / CELLS
-    shape = tuple(int(n) for n in np.ceil((high - low) / cell) + 3)
+    nx, ny, nz = (int(n) for n in np.ceil((high - low) / cell) + 3)
 
     def measure(points: Floats) -> Floats:
         to_left = signed_distance(points, rest)[0]
-        return np.maximum((signed_distance(points, own)[0] - to_left) / 2, 1.8 * cell - to_left)
+        return np.asarray(np.maximum((signed_distance(points, own)[0] - to_left) / 2, 1.8 * cell - to_left))
 
     hold = to_manifold(background, origin)
     try:
-        room = to_manifold(extract_contour(measure, low - cell, shape, cell), origin)
+        room = to_manifold(extract_contour(measure, low - cell, (nx, ny, nz), cell), origin)
     except StageError:  # narrower than the cells everywhere
         return Mesh(*to_arrays(lost ^ hold, origin))
     return Mesh(*to_arrays((lost + (room - left)) ^ hold, origin))

@@ -42,5 +42,5 @@ class Divide(Enclose):
         from damageest.stages.enclose._room import join_room
 
         sheet = extend_outside(surface, rims, part, self.overhang * tolerance, tolerance)
-        lost, left = divide_part(part, sheet, len(surface.faces), intact, self.side, tolerance)
+        lost, left = divide_part(part, sheet, intact, self.side, tolerance)
         return join_room(lost, left, background, part)
