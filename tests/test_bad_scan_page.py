@@ -8,7 +8,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from PIL import Image
 from typer.testing import CliRunner
 
 from damageest.cli import app
@@ -17,6 +16,7 @@ from damageest.registry.contracts import STAGES
 from damageest.rules.advice import TOPICS, Topic
 from damageest.rules.notes import RUN_CODES
 from damageest.rules.pose import POSE_CODES
+from tests.needs import import_or_skip
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "bad-scan.md").read_text()
@@ -58,12 +58,13 @@ def test_the_lines_of_a_job_are_what_it_prints(name: str, tmp_path: Path) -> Non
 
 def test_each_job_is_quoted_and_each_picture_is_shown() -> None:
     assert {name for name, _ in QUOTED} == {path.stem for path in JOBS.glob("*.yaml")}
+    image = import_or_skip("PIL.Image")
     shown = set(re.findall(r"\(images/(bad-scan-\w+\.png)\)", PAGE))
     drawn = sorted((ROOT / "docs" / "images").glob("bad-scan-*.png"))
     assert shown == {path.name for path in drawn}
     for path in drawn:
         assert path.stat().st_size < 60_000
-        with Image.open(path) as picture:
+        with image.open(path) as picture:
             assert picture.width == 700
 
 

@@ -7,12 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 from damageest.registry.contracts import STAGES
 from tests import damaged_box
-from tests.needs import PLUGINS, needs_plugin
+from tests.needs import PLUGINS, import_or_skip, needs_plugin
 
 ROOT = Path(__file__).parents[2]
 
@@ -59,6 +58,7 @@ def test_the_table_says_what_to_deposit_and_what_to_mill_off(tmp_path: Path) -> 
 
 
 def test_json_is_the_result_and_fits_its_schema(tmp_path: Path) -> None:
+    jsonschema = import_or_skip("jsonschema")
     done = call("run", damaged_box.write(tmp_path), "--json", "--set", "method=implicit", "--no-cache")
     report = json.loads(done.stdout)
     assert report == json.loads((tmp_path / "out/job/result.json").read_text())

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-import jsonschema
 import numpy as np
 import trimesh
 
@@ -14,12 +13,14 @@ from damageest.findings import Surplus
 from damageest.io.meshes import write_points
 from damageest.output.result_json import result_schema
 from tests.cli.test_cli import call
+from tests.needs import import_or_skip
 from tests.surplus_scenes import TOLERANCE, block, scan, slab, table
 
 JOB = f"version: 1\ntolerance: {TOLERANCE}\nalign: none\npart: part.stl\nscan: scan.ply\nexport: {{frame: both}}\n"
 
 
 def test_surplus_is_in_the_table_the_files_and_the_report(tmp_path: Path) -> None:
+    jsonschema = import_or_skip("jsonschema")
     trimesh.creation.box((24, 18, 12)).export(tmp_path / "part.stl")
     x, y, z = np.concatenate([scan(block() + slab((6, 5, 2), 0, 0, 6), 12_000), table(count=3000)]).T
     write_points(tmp_path / "scan.ply", {"x": x, "y": y, "z": z})

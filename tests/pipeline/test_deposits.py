@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import numpy as np
 import pytest
 from manifold3d import Manifold
@@ -26,6 +25,7 @@ from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from damageest.stages.allowance.none import NoAllowance
 from tests import damaged_box
+from tests.needs import import_or_skip
 
 OUTER = 1.0
 JOB = damaged_box.JOB + f"allowance: {{use: milling, outer: {OUTER}}}\n"
@@ -42,6 +42,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_the_report_has_the_figures(folder: Path) -> None:
+    jsonschema = import_or_skip("jsonschema")
     content = json.loads((folder / "out/job/result.json").read_text())
     jsonschema.Draft202012Validator(result_schema()).validate(content)
     (site,) = content["sites"]

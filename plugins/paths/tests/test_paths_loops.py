@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
 import pytest
 from damageest_paths.clearance import Clearance
-from damageest_paths.compiling import compile_loops, run_loops
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.obstacles import Obstacles
 from hypothesis import given
@@ -16,6 +14,10 @@ from hypothesis import strategies as st
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.vectors import normalise
+from tests.needs import import_or_skip
+
+numba = import_or_skip("numba")
+compiling = import_or_skip("damageest_paths.compiling")
 
 CONES = {
     "nozzle": Cone(1.0, 4.0, 12.0, np.radians(20)),
@@ -88,15 +90,15 @@ def test_the_loops_are_compiled_where_no_folder_can_be_written(monkeypatch: pyte
     def add(one: float, other: float) -> float:
         return one + other
 
-    assert compile_loops(add)(1.0, 2.0) == 3.0
+    assert compiling.compile_loops(add)(1.0, 2.0) == 3.0
 
 
-@compile_loops
+@compiling.compile_loops
 def _double(value: float) -> float:
     return 2 * value
 
 
-@compile_loops
+@compiling.compile_loops
 def _double_and_add(value: float) -> float:
     return _double(value) + 1
 
@@ -110,5 +112,5 @@ def test_the_loops_run_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", refuse)
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.load", lambda *given: None)
-    assert run_loops(_double_and_add, 3.0) == 7.0
+    assert compiling.run_loops(_double_and_add, 3.0) == 7.0
     assert len(saved) == 2

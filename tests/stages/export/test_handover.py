@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import lib3mf
 import numpy as np
 import pytest
 import trimesh
@@ -23,6 +22,7 @@ from damageest.registry import Registry
 from damageest.result import Result
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, UNDAMAGED
 from damageest.stages.export.files import Files
+from tests.needs import import_or_skip
 from tests.stages.export import results
 
 
@@ -33,7 +33,7 @@ def write(result: Result, folder: Path, registry: Registry, **options: Any) -> A
 
 def opened(path: Path) -> tuple[str, dict[str, tuple[trimesh.Trimesh, str]]]:
     """By lib3mf: the unit in the model, and each item of the build by its name: mesh and colour."""
-    model = lib3mf.get_wrapper().CreateModel()
+    model = import_or_skip("lib3mf").get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
     reader.ReadFromFile(str(path))

@@ -6,7 +6,6 @@ import re
 from pathlib import Path
 
 import pytest
-from babel.messages import pofile
 
 import damageest
 from damageest.errors import JobError
@@ -14,9 +13,10 @@ from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.report._words import FOLDER, Words, list_languages
 from tests import damaged_box
+from tests.needs import import_or_skip
 
-pypdfium2 = pytest.importorskip("pypdfium2")
-pytest.importorskip("reportlab")
+pypdfium2 = import_or_skip("pypdfium2")
+import_or_skip("reportlab")
 
 REPORT = "report: {{use: html, pdf: yes, company: Müller & Söhne, language: {}}}\nsections: [{{y: 0}}]\n"
 SOURCES = (Path(damageest.__file__).parent / "stages/report").glob("_pdf*.py")
@@ -58,6 +58,7 @@ def test_the_pdf_has_a_summary_sections_and_a_page_for_each_site(tmp_path: Path)
 
 
 def test_every_text_of_the_pdf_is_in_each_catalogue() -> None:
+    pofile = import_or_skip("babel.messages.pofile")
     texts = set()
     for path in SOURCES:
         source = path.read_text()
