@@ -123,9 +123,10 @@ def find_chains(sources: Mapping[str, str]) -> dict[str, dict[str, str]]:
     """
     optional = {module for modules in list_optional().values() for module in modules}
     chains: dict[str, dict[str, str]] = {}
-    direct = re.compile(rf"^\s*(?:import|from)\s[^#\n]*\b(?:{'|'.join(sorted(optional))})\b", re.MULTILINE)
+    direct = re.compile(rf"^[ \t]*(?:import|from)\s[^#\n]*\b(?:{'|'.join(sorted(optional))})\b", re.MULTILINE)
+    statements = {name: _list_statements(source) for name, source in sources.items()}
     for name, source in sources.items():
-        if direct.search(source):
+        if direct.search(statements[name]):
             for imported in parse_imports(source):
                 if (top := imported.partition(".")[0]) in optional:
                     chains.setdefault(name, {}).setdefault(top, f"{name} -> {imported}")
@@ -134,7 +135,7 @@ def find_chains(sources: Mapping[str, str]) -> dict[str, dict[str, str]]:
         words = _match_imports_of(fresh)
         grown: set[str] = set()
         for name, source in sources.items():
-            if words.search(source):
+            if words.search(statements[name]):
                 loaded = {part for imported in parse_imports(source) for part in _list_packages(imported)}
                 for needed in sorted(loaded & fresh - {name}):
                     for module, chain in list(chains[needed].items()):
@@ -145,10 +146,16 @@ def find_chains(sources: Mapping[str, str]) -> dict[str, dict[str, str]]:
     return {name: needed for name, needed in chains.items() if needed}
 
 
+def _list_statements(source: str) -> str:
+    """The lines of a text that begin an import: to search these takes a fraction of the time."""
+    return "\n".join(line for line in source.splitlines() if line.lstrip().startswith(("import ", "from ")))
+
+
 def _match_imports_of(names: Iterable[str]) -> re.Pattern[str]:
-    """Matches each text that may import one of the modules: one that has its name, or that of its package."""
-    wanted = {re.escape(part) for name in names for part in (name, name.rpartition(".")[0]) if part}
-    return re.compile(rf"^\s*(?:import|from)\s+(?:{'|'.join(sorted(wanted))})\b", re.MULTILINE)
+    """Matches each text that may import one of the modules: that names it, or takes something out of its package."""
+    whole = "|".join(re.escape(name) for name in sorted(names))
+    packages = "|".join(sorted({re.escape(name.rpartition(".")[0]) for name in names if "." in name})) or "(?!)"
+    return re.compile(rf"^[ \t]*(?:(?:import|from)\s+(?:{whole})\b|from\s+(?:{packages})\s+import\b)", re.MULTILINE)
 
 
 def _list_packages(name: str) -> Iterator[str]:
