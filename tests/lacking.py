@@ -1,24 +1,43 @@
-"""A plugin of pytest: the tests of a plugin of ours are skipped where a package that it requires does not load."""
+"""A plugin of pytest: a test that cannot run since a package is missing here, or does not load, is skipped."""
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Generator
 from pathlib import Path
 
 import pytest
 
-from tests.needs import PLUGINS, find_unusable
+from tests.needs import PLUGINS, explain_import_error, find_unusable
+from tests.optional_imports import ROOT
 
-PLUGIN_TESTS = {Path(__file__).parents[1] / "plugins" / plugin / "tests": plugin for plugin in PLUGINS}
+PLUGIN_TESTS = {ROOT / "plugins" / plugin / "tests": plugin for plugin in PLUGINS}
 
 
 @pytest.hookimpl(wrapper=True)
-def pytest_runtest_makereport(item: pytest.Item) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """A plugin's test that fails on such a machine is skipped, with the reason. The packages are tried after a failure
-    only: to import all of them takes seconds."""
+def pytest_runtest_makereport(
+    item: pytest.Item, call: pytest.CallInfo[None]
+) -> Generator[None, pytest.TestReport, pytest.TestReport]:
+    """Looks at a test that failed only: to try all packages before takes seconds."""
     report = yield
-    plugin = PLUGIN_TESTS.get(item.path.parent)
-    if report.failed and plugin and (reason := find_unusable(plugin)):
+    if report.failed and call.excinfo is not None and (reason := _find_reason(item.path, call.excinfo.value)):
         report.outcome = "skipped"
         report.longrepr = (str(item.path), 0, f"Skipped: {reason}")
     return report
+
+
+def _find_reason(path: Path, error: BaseException) -> str:
+    """Which package is missing that the test itself imports, or that the plugin requires whose test it is. Empty where
+    code of the product raises ImportError: it has to say what is missing."""
+    if isinstance(error, ImportError) and _is_of_tests(error):
+        return explain_import_error(error)
+    plugin = PLUGIN_TESTS.get(path.parent)
+    return find_unusable(plugin) if plugin else ""
+
+
+def _is_of_tests(error: ImportError) -> bool:
+    """Whether the last statement of this repository that led to the error stands in a file of tests."""
+    files = [Path(frame.filename) for frame in traceback.extract_tb(error.__traceback__)]
+    own = [file.relative_to(ROOT).parts for file in files if file.is_relative_to(ROOT)]
+    own = [parts for parts in own if parts[0] in ("damageest", "tests", "plugins")]
+    return bool(own) and "tests" in own[-1]

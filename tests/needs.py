@@ -36,7 +36,9 @@ def find_obstacle(plugin: str) -> str:
     except PluginError as error:
         return f"{error}; {error.remedy}"
     except ImportError as error:
-        return _explain(error)
+        if said := explain_import_error(error):
+            return said
+        raise
     return ""
 
 
@@ -48,12 +50,10 @@ def find_unusable(plugin: str) -> str:
         if obstacle := find_obstacle(plugin):
             return obstacle
         for module in list_required(plugin):
-            try:
-                importlib.import_module(module)
-            except ImportError as error:
-                return f"the plugin {plugin} needs {module}: {_explain(error)}"
-    except ImportError:
-        return ""
+            importlib.import_module(module)
+    except ImportError as error:
+        said = explain_import_error(error)
+        return f"the plugin {plugin} cannot be used here: {said}" if said else ""
     return ""
 
 
@@ -63,18 +63,19 @@ def import_or_skip(module: str) -> Any:
     try:
         return importlib.import_module(module)
     except ImportError as error:
-        reason = _explain(error)
+        if not (reason := explain_import_error(error)):
+            raise
     pytest.skip(reason, allow_module_level=True)
 
 
-def _explain(error: ImportError) -> str:
-    """What is missing, and what to install. Raises the error where nothing is: the module is broken, or not there
-    though it is of this repository."""
+def explain_import_error(error: ImportError) -> str:
+    """What is missing, and what to install; empty where nothing is: the module is broken, or not there though it is of
+    this repository."""
     if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith(("damageest", "tests")):
         return _say_missing(error.name.partition(".")[0])
     if find_missing_library(error) and (described := describe_missing_library(error)):
         return f"{described.message}; {described.own_remedy}"
-    raise error
+    return ""
 
 
 def _say_missing(module: str) -> str:

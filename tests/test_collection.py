@@ -8,6 +8,7 @@ import re
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -19,6 +20,12 @@ NATIVE = ("cadquery", "open3d-cpu", "pymeshlab", "pyvista", "vtk", "python-fcl",
 """Packages that load libraries of the system."""
 LIBRARY = "libGL.so.1"
 LIBRARIES = ("libGL.so.1", "libEGL.so.1", "libX11.so.6", "libOpenGL.so.0")
+TEXTS = {
+    path: path.read_text()
+    for folder in ("tests", "plugins")
+    for path in sorted((ROOT / folder).rglob("*.py"))
+    if "tests" in path.parts and path.stem not in ("test_collection", "test_optional_imports")
+}
 HIDE = ROOT / "tests" / "blocking" / "hide_libraries"
 REASONS = {
     "open3d": "Open3D needs libEGL.so.1, libGL.so.1",
@@ -42,13 +49,21 @@ def run_pytest(*options: str, blocked: tuple[str, ...] = (), lacks: str = "", be
 
 
 def list_users(package: str) -> list[str]:
-    """The files of tests that import a package, and those of the plugins that require it."""
+    """The files of tests that import a package, themselves or by a file of helpers, and those of the plugins that
+    require it."""
     modules = OPTIONAL[package]
-    imports = re.compile(rf"(?:import|from|import_or_skip\(|import_for\(.*)\s*\"?(?:{'|'.join(modules)})\b")
     plugins = [ROOT / "plugins" / name / "tests" for name in PLUGINS if set(modules) & set(list_required(name))]
-    files = (path for folder in ("tests", "plugins") for path in sorted((ROOT / folder).rglob("test_*.py")))
-    others = [path for path in files if path.parent not in plugins and imports.search(path.read_text())]
-    return [str(path.relative_to(ROOT)) for path in (*plugins, *others)]
+    found = {path for path in TEXTS if path.parent not in plugins and _imports(path, modules)}
+    helpers = tuple(path.stem for path in found if not path.stem.startswith("test_"))
+    found |= {path for path in TEXTS if helpers and path.parent not in plugins and _imports(path, helpers)}
+    users = sorted(path for path in found if path.stem.startswith("test_"))
+    return [str(path.relative_to(ROOT)) for path in (*plugins, *users)]
+
+
+def _imports(path: Path, modules: tuple[str, ...]) -> bool:
+    names = "|".join(modules)
+    pattern = rf"^\s*(?:import|from)\s[^#\n]*\b(?:{names})\b|import_(?:or_skip|for)\([^)]*\"(?:{names})\b"
+    return re.search(pattern, TEXTS[path], re.MULTILINE) is not None
 
 
 @pytest.mark.slow
