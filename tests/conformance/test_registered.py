@@ -68,7 +68,7 @@ WITH: dict[str, dict[str, Any]] = {
 
 
 SLOW = {
-    *("align icp", "align register", "adapt auto"),
+    *("align icp", "align register", "adapt auto", "adapt smooth"),
     *(
         "reconstruct ball_pivot",
         "reconstruct pymeshlab",

@@ -22,19 +22,19 @@ def damageest_conversions():
 """
 
 
-def test_a_plugins_conversion_is_called_with_the_result(site: Site, small_done: Path) -> None:  # noqa: F811
+def test_a_plugins_conversion_is_called_with_the_result(site: Site, tiny_done: Path) -> None:  # noqa: F811
     site.add("acme-count", COUNTED.replace("NAME", "'count'"))
-    result = damageest.run(small_done, output=True)
+    result = damageest.run(tiny_done, output=True)
     assert result.convert("count", "damage", 1) == len(result.sites[0].damage.faces)
     with pytest.raises(InputError, match=r"no plugin here converts a result to 'cont'; there are: .*\bcount\b"):
         result.convert("cont", "damage", 1)
 
 
 def test_without_the_package_it_is_named_and_the_result_can_be_pickled(
-    small_done: Path, monkeypatch: pytest.MonkeyPatch
+    tiny_done: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("damageest.registry.loading._list_installed", list)
-    result = pickle.loads(pickle.dumps(damageest.run(small_done, output=True)))
+    result = pickle.loads(pickle.dumps(damageest.run(tiny_done, output=True)))
     with pytest.raises(InputError, match="'cadquery' needs the plugin damageest-cadquery, which is not installed"):
         result.as_cadquery("damage", 1)
 
