@@ -68,7 +68,7 @@ WITH: dict[str, dict[str, Any]] = {
 
 
 SLOW = {
-    *("align icp", "align register", "adapt auto", "adapt smooth"),
+    *("align icp", "align register", "adapt auto", "adapt smooth", "part brep"),
     *(
         "reconstruct ball_pivot",
         "reconstruct pymeshlab",
@@ -79,9 +79,9 @@ SLOW = {
     *("enclose adaptive", "enclose octree", "enclose poisson_subtract", "enclose shortest_path", "enclose sweep"),
 }
 """Implementations of which -m slow makes all checks, and the default run those of `BRIEF`."""
-ELSEWHERE = {"align register", "adapt auto", "enclose poisson_subtract"}
-"""Those of them that the default run leaves out here: each job runs the first, `adapt: smooth` is what the second runs,
-and the third takes 12 s."""
+ELSEWHERE = {"align register", "adapt auto", "enclose poisson_subtract", "part brep"}
+"""Those of them that the default run leaves out here, since one run takes 2 s or more: each job runs the first,
+`adapt: smooth` is what the second runs, and the plugins have tests of their own of the others."""
 BRIEF = ("test_declares_itself", "test_gives_its_type", "test_leaves_its_inputs", "test_fits_its_inputs")
 
 

@@ -203,7 +203,7 @@ class Watcher:
 """
 
 
-@pytest.mark.parametrize("error", ["GeneratorExit", "SystemExit", "RuntimeError"])
+@pytest.mark.parametrize("error", ["SystemExit", "RuntimeError"])
 def test_an_observer_that_raises_is_a_warning_whatever_it_raises(error: str, site: Site, tiny_done: Path) -> None:
     import importlib
 
@@ -250,14 +250,8 @@ LEAVES = {
 }
 
 
-@pytest.mark.parametrize(
-    ("name", "command"),
-    [
-        ("thread", FORKED),
-        pytest.param("exit handler", FORKED, marks=pytest.mark.slow),
-        pytest.param("pool", ALONE, marks=pytest.mark.slow),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "command"), [("thread", FORKED), ("exit handler", FORKED), ("pool", ALONE)])
 def test_a_thread_that_a_plugin_leaves_does_not_keep_the_process(
     name: str, command: list[str], site: Site, tmp_path: Path
 ) -> None:
