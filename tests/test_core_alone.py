@@ -18,6 +18,8 @@ from damageest.geometry import isosurface
 from damageest.isolation import end_workers
 from tests import damaged_box
 
+COARSE = damaged_box.JOB.replace("tolerance: 0.2", "tolerance: 0.4")
+
 
 @pytest.fixture(autouse=True)
 def without_extras(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
@@ -34,9 +36,9 @@ def without_extras(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.Tem
 
 
 def test_a_run_needs_no_extra_and_names_the_one_of_the_page(tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path, damaged_box.JOB.replace("report: none\n", ""))
+    job = damaged_box.write(tmp_path, COARSE.replace("report: none\n", ""), 1000)
     result = damageest.run(job, output=tmp_path / "out")
-    assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.02)
+    assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.15)
     said = [str(warning) for warning in result.warnings if warning.code == "report"]
     assert said == [
         "report.html was not written: the Python module k3d is not installed; the extra 'report' brings it; "
@@ -49,19 +51,24 @@ def test_a_run_needs_no_extra_and_names_the_one_of_the_page(tmp_path: Path) -> N
 
 
 def test_the_method_of_the_paper_names_its_extra(tmp_path: Path) -> None:
-    job = damaged_box.write_small(tmp_path, "method: surface\n")
+    job = damaged_box.write(tmp_path, COARSE + "method: surface\n", 2000)
     with pytest.raises(StageError, match=r'"damageest\[vtk\]"'):
         damageest.run(job)
 
 
-def test_auto_says_that_its_second_method_needs_an_extra(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Where implicit gives no site the run fails; where the scan contradicts its site, this is told with the site."""
-    job = damaged_box.write_small(tmp_path, "method: auto\n")
-
+def test_where_the_first_method_gives_no_site_the_extra_of_the_second_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = damaged_box.write(tmp_path, COARSE + "method: auto\n", 2000)
     monkeypatch.setattr(isosurface, "extract_region", lambda grid, field: None)
     with pytest.raises(StageError, match=r"method surface cannot be tried: .*\n.*\"damageest\[vtk\]\""):
         damageest.run(job)
 
+
+def test_where_the_scan_contradicts_a_site_the_extra_is_told_with_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    job = damaged_box.write(tmp_path, COARSE + "method: auto\n", 2000)
     wrong = trimesh.creation.icosphere(radius=9).apply_translation((0, 0, 10))
     monkeypatch.setattr(isosurface, "extract_region", lambda grid, field: Solid(wrong.vertices, wrong.faces))
     result = damageest.run(job, settings=["accept=all"])
