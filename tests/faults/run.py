@@ -58,10 +58,8 @@ class Worker:
     def try_job(self, path: Path, mode: str = "read", seconds: float = SECONDS) -> Row:
         """The outcome of one job or file."""
         if self.child is None:
-            command = [sys.executable, "-m", "tests.faults.worker"]
-            root = Path(__file__).parents[2]
-            self.child = subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1, cwd=root)
-            assert self._wait(120) == "ready\n"
+            self.start()
+        assert self.child
         assert self.child.stdin
         self.peak = 0
         self.child.stdin.write(f"{mode} {path}\n")
@@ -76,6 +74,13 @@ class Worker:
         status = self.child.returncode
         self.child = None
         return {"outcome": answer or "crash", "words": f"exit status {status}", "seconds": seconds, "peak": self.peak}
+
+    def start(self) -> None:
+        """Starts the child, which then waits for jobs."""
+        command = [sys.executable, "-m", "tests.faults.worker"]
+        root = Path(__file__).parents[2]
+        self.child = subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1, cwd=root)
+        assert self._wait(120) == "ready\n"
 
     def _wait(self, seconds: float) -> str:
         """The next line of the child, or what went wrong: 'hang', 'memory', or '' where it died."""

@@ -22,6 +22,7 @@ from tests.needs import needs_plugin
 @pytest.fixture(scope="module")
 def worker() -> Iterator[Worker]:
     one = Worker()
+    one.start()
     yield one
     one.stop()
 
@@ -236,8 +237,8 @@ def test_a_reader_that_crashes_or_hangs_is_the_files_fault(name: str, worker: Wo
 
 ALIASES = ("ab", "bc", "cd", "de", "ef", "fg")
 JOBS: dict[str, tuple[str, str]] = {
-    "deep": ("x: " + "[" * 100_000, "inside each other"),
-    "many": ("x: [" + "1," * 100_000 + "1]", "more than 20000 values"),
+    "deep": ("x: " + "[" * 20_000, "inside each other"),
+    "many": ("x: [" + "1," * 25_000 + "1]", "more than 20000 values"),
     "aliases": (
         "a: &a [1,1,1,1,1,1,1,1,1,1]\n" + "".join(f"{k}: &{k} [{f'*{j},' * 10}1]\n" for j, k in ALIASES),
         "aliases",
