@@ -93,7 +93,8 @@ CASES: dict[str, tuple[Spoil, int, str]] = {
     "scan in metres": (scan(lambda p: p / 1000), 2, "scan.unit: m"),
     "scan in inches": (scan(lambda p: p / 25.4), 2, "scan.unit: in"),
     "part in inches": (part(lambda m: m.apply_scale(1 / 25.4)), 2, "part.unit: in"),
-    "scan of another part": (scan(of_another_part), 1, "align"),
+    "scan of another part": (scan(of_another_part, "align: icp\n"), 1, "align"),
+    "scan of another part anywhere": (scan(of_another_part), 1, "align"),
     "tool that misses": (job(SIMULATE.format("{tool: sphere, centre: [99, 0, 0], radius: 1}"), True), 1, "misses"),
     "tool that takes all": (job(SIMULATE.format("{tool: sphere, centre: [0, 0, 0], radius: 99}"), True), 1, "simulate"),
     "unknown tool": (job(SIMULATE.format("{tool: hammer}"), True), 2, "tool"),
@@ -102,7 +103,9 @@ CASES: dict[str, tuple[Spoil, int, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=pytest.mark.slow if name.endswith("anywhere") else ()) for name in CASES]
+)
 def test_refused_with_a_reason(case: str, tmp_path: Path) -> None:
     spoil, status, text = CASES[case]
     path = damaged_box.write(tmp_path, points=POINTS)

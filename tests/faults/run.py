@@ -113,7 +113,7 @@ def make_cases(count: int, seed: int, names: list[str], share: float = 0.0) -> I
     """Spoiled files. The same arguments, the same files; the first of a larger count are those of a smaller one."""
     for number in range(count):
         name = names[number % len(names)]
-        kind = KINDS[number // len(names) % len(KINDS)]
+        kind = KINDS[sum(divmod(number, len(names))) % len(KINDS)]  # the first few already have every way
         whole = name not in others.FILES and random.Random(f"{seed}/whole/{number}").random() < share
         yield Case(name, kind, spoil(find_seed(name), name, kind, random.Random(f"{seed}/{name}/{number}")), whole)
 
@@ -145,25 +145,27 @@ def fuzz(
     names: list[str] | None = None,
     tell: Callable[[Row], None] = lambda row: None,
     first: int = 0,
+    worker: Worker | None = None,
 ) -> list[Row]:
-    """The outcome of each spoiled file, from the number ``first`` on."""
-    worker, rows = Worker(), list[Row]()
+    """The outcome of each spoiled file, from the number ``first`` on. ``worker``: one that goes on afterwards."""
+    own, rows = worker or Worker(), list[Row]()
     with tempfile.TemporaryDirectory() as held:
         folder = Path(held)
         seeds.write_others(folder)
         if whole:
-            make_earlier(folder, worker)
+            make_earlier(folder, own)
         try:
             for number, case in islice(enumerate(make_cases(count, seed, names or NAMES, whole)), first, None):
                 before = damaged_box.content(folder / KEPT) if case.whole else {}
-                row = worker.try_job(write_case(folder, case), "run" if case.whole else "read")
+                row = own.try_job(write_case(folder, case), "run" if case.whole else "read")
                 if case.whole and (lost := find_loss(folder / KEPT, before, row["outcome"])):
                     row |= {"outcome": "lost", "words": f"{lost}; was {row['outcome']}: {row.get('words')}"}
-                    make_earlier(folder, worker)
+                    make_earlier(folder, own)
                 rows.append({"number": number, "name": case.name, "kind": case.kind, "whole": case.whole, **row})
                 tell(rows[-1])
         finally:
-            worker.stop()
+            if worker is None:
+                own.stop()
     return rows
 
 

@@ -23,6 +23,7 @@ from damageest.pipeline.deposits import make_deposits, separate_deposits
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.registry import Registry
+from damageest.result import Result
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from damageest.stages.allowance.none import NoAllowance
@@ -36,11 +37,15 @@ LID = np.pi * 36
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory, registry: Registry) -> Path:
-    """A job, run once with stock on the skin."""
+def ran(tmp_path_factory: pytest.TempPathFactory, registry: Registry) -> tuple[Path, Result]:
+    """The folder of a job, which ran once with stock on the skin."""
     path = damaged_box.write(tmp_path_factory.mktemp("milled"), JOB, 6000)
-    damageest.run(path, output=True, registry=registry)
-    return path.parent
+    return path.parent, damageest.run(path, output=True, registry=registry)
+
+
+@pytest.fixture(scope="module")
+def folder(ran: tuple[Path, Result]) -> Path:
+    return ran[0]
 
 
 @pytest.fixture
@@ -84,8 +89,10 @@ def test_the_written_job_says_the_same(folder: Path) -> None:
     assert first.sites[0].deposit.vertices.tobytes() == second.sites[0].deposit.vertices.tobytes()
 
 
-def test_a_cut_back_enlarges_the_cavity_and_not_the_damage_that_was_found(copied: Path, registry: Registry) -> None:
-    plain = damageest.run(copied, output=True, registry=registry)
+def test_a_cut_back_enlarges_the_cavity_and_not_the_damage_that_was_found(
+    ran: tuple[Path, Result], copied: Path, registry: Registry
+) -> None:
+    plain = ran[1]
     cut = damageest.run(copied, output=True, settings=["allowance.inner=0.5"], registry=registry)
     before, after = plain.sites[0], cut.sites[0]
     assert after.damage.volume == pytest.approx(2 / 3 * np.pi * 6.5**3, rel=0.05)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from damageest.result import Result, Site
 from tests import damaged_box
 from tests.pipeline.halfway import Halfway, run_until
 
-NOISE = 0.01
+NOISE, TOLERANCE = 0.01, 0.2
 CERTIFICATE = {
     "probing_form": 0.08,
     "probing_size": 0.02,
@@ -52,23 +53,36 @@ def sample_damaged() -> tuple[Floats, Floats]:
     return np.asarray(points), np.asarray(mesh.face_normals[face])
 
 
-@cache
-def run(align: str, offset: float = 0.0, scale: float = 1.0, more: str = "{}", noise: float = NOISE) -> Result:
-    """A run on points that lie outside by ``offset``, scaled about the middle of the part."""
+def make_scan(offset: float = 0.0, scale: float = 1.0, noise: float = NOISE) -> Scan:
+    """Points that lie outside by ``offset``, scaled about the middle of the part."""
     points, normals = sample_damaged()
     points = scale * (points + offset * normals)
-    points = points + np.random.default_rng(0).normal(scale=noise, size=points.shape)
+    return Scan(points + np.random.default_rng(0).normal(scale=noise, size=points.shape))
+
+
+@cache
+def run(align: str, offset: float = 0.0, scale: float = 1.0, more: str = "{}") -> Result:
     aligned = {"use": "icp", "datum": DATUMS} if align == "datums" else align
-    job = {"version": 1, "tolerance": 0.1, "report": "none", "align": aligned, "adapt": "none", **json.loads(more)}
-    return damageest.run(job, part=make_box(), scan=Scan(points))
+    job = {
+        "version": 1,
+        "tolerance": TOLERANCE,
+        "report": "none",
+        "align": aligned,
+        "adapt": "none",
+        **json.loads(more),
+    }
+    return damageest.run(job, part=make_box(), scan=make_scan(offset, scale))
+
+
+def run_until_weighed(registry: Registry, scale: float = 1.0, step: str = "weigh_scanner", **more: Any) -> Halfway:
+    job = {"tolerance": TOLERANCE, "align": "none", "adapt": "none", **more}
+    return run_until(step, make_box(), make_scan(scale=scale), registry, **job)
 
 
 @pytest.fixture(scope="module")
 def plain(registry: Registry) -> Halfway:
     """Before what is known of the scanner is weighed. The part is at 20 degrees: its temperature changes nothing."""
-    points, _ = sample_damaged()
-    points = points + np.random.default_rng(0).normal(scale=NOISE, size=points.shape)
-    return run_until("weigh_scanner", make_box(), Scan(points), registry, tolerance=0.1, align="none", adapt="none")
+    return run_until_weighed(registry)
 
 
 def find_row(budget: Budget | None, source: str) -> BudgetRow:
@@ -93,10 +107,11 @@ DATUMS = [
     ],
 )
 def test_a_sensitivity_is_what_a_scan_with_that_error_shows(
-    align: str, source: str, offset: float, scale: float
+    align: str, source: str, offset: float, scale: float, plain: Halfway
 ) -> None:
     given = json.dumps(GIVEN)
-    before, after = run(align, more=given), run(align, offset, scale, given)
+    before = plain.finish(**GIVEN) if align == "none" else run(align, more=given)
+    after = run(align, offset, scale, given)
     size = 2 * offset if offset else scale - 1
     expected = find_row(before.budget, source).sensitivity * size
     assert after.damage_volume - before.damage_volume == pytest.approx(expected, abs=0.45)
@@ -123,9 +138,10 @@ def test_a_warm_part_is_brought_to_20_degrees(plain: Halfway) -> None:
     assert {row.source for row in warm.budget.rows} >= {"temperature", "expansion"}  # type: ignore[union-attr]
 
 
-def test_a_wrong_scale_is_named() -> None:
-    cold = run("none", scale=1.004, more=json.dumps({"scanner": {"certificate": {"length": 0.005, "k": 2}}}))
-    (note,) = [note for note in cold.warnings if note.code == "certificate"]
+def test_a_wrong_scale_is_named(registry: Registry) -> None:
+    told = {"certificate": {"length": 0.005, "k": 2}}
+    cold = run_until_weighed(registry, 1.004, "measure_uncertainty", scanner=told)
+    (note,) = [note for note in cold.state.warnings if note.code == "certificate"]
     assert note.amount == pytest.approx(0.4, abs=0.05)
 
 

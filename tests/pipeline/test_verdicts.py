@@ -22,7 +22,7 @@ from tests.damaged_box import JOB, SIZE, box, write
 from tests.pipeline.halfway import Halfway, run_until
 
 TOP = SIZE[2] / 2
-POINTS, TOLERANCE = 9000, 0.3
+POINTS, TOLERANCE = 7000, 0.3
 COARSE = JOB.replace("tolerance: 0.2", f"tolerance: {TOLERANCE}")
 DENTS = [
     {"tool": "sphere", "centre": [-12, 0, TOP], "radius": 4},
