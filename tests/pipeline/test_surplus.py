@@ -15,7 +15,6 @@ from damageest.geometry.solids import iou, to_solid
 from damageest.result import Result
 from tests.surplus_scenes import ball, block, part, scan, slab, table
 
-
 COARSE = 0.2
 
 
