@@ -8,14 +8,14 @@ from pathlib import Path
 import pytest
 
 from damageest.registry import Registry
-from tests.faults.sizes import Case, Row, compare_rows, list_cases, list_usual, read_rows, run_case, write_rows
+from tests.faults.sizes import Case, Row, compare_rows, list_cases, list_cheap, read_rows, run_case, write_rows
 
-DEFAULT, USUAL = list_cases(), list_usual()
+CHEAP, DEFAULT = list_cheap(), list_cases()
 ALL = [*DEFAULT, *(case for case in list_cases(whole=True) if case not in DEFAULT)]
 
 
 def mark(case: Case) -> tuple[pytest.MarkDecorator, ...]:
-    return () if case in DEFAULT else (pytest.mark.slow,) if case in USUAL else (pytest.mark.nightly,)
+    return () if case in CHEAP else (pytest.mark.slow,) if case in DEFAULT else (pytest.mark.nightly,)
 
 
 ENOUGH = 5000
