@@ -2,9 +2,9 @@
 
 Usage: python -m tests.faults.sizes [--whole] [--write sizes.csv] [--against sizes-before.csv]
 
-``--whole``: all parts with known and unknown pose, some minutes; else what the default and the slow tests run. ``--against``: says
-in which runs the outcome differs from that of an earlier file, and how much longer all runs take. A run differs where a
-column other than the seconds does.
+``--whole``: all parts with known and unknown pose, some minutes; else what the default and the slow tests run.
+``--against``: says in which runs the outcome differs from that of an earlier file, and how much longer all runs take.
+A run differs where a column other than the seconds does.
 """
 
 from __future__ import annotations
