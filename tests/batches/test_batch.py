@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ import damageest
 from damageest.batches.files import NEW_ROWS, read_rows
 from damageest.batches.page import write_page
 from damageest.batches.rows import Row, read_row
-from damageest.batches.work import work
+from damageest.batches.work import run_job, work
 from damageest.io.files import embed_png
 from damageest.isolation import end_workers
 from tests import damaged_box
@@ -34,7 +35,7 @@ def client() -> Iterator[Any]:
     """Workers that are threads: they start quickly, and each job has a process all the same."""
     from distributed import Client
 
-    with Client(processes=False, n_workers=1, threads_per_worker=2, dashboard_address=None) as client:
+    with Client(processes=False, n_workers=1, threads_per_worker=1, dashboard_address=None) as client:
         yield client
 
 
@@ -54,66 +55,100 @@ def without_times(folder: Path) -> dict[str, bytes]:
     return {name: data for name, data in files.items() if not name.endswith(".npz")}  # they hold the time of day
 
 
-def test_rows_of_a_batch(client: Any, tmp_path: Path) -> None:
-    """A job of a matrix, one that is refused, one whose scan is not there; then the same again, and what changed."""
-    job = damaged_box.write_small(tmp_path)
-    shutil.copy(tmp_path / "scan.ply", tmp_path / "second.ply")
+@dataclass(frozen=True)
+class Done:
+    """A batch: its job files, its rows, and the folder with its output ``b`` and, as ``first``, what its first job
+    wrote."""
+
+    words: list[Path]
+    rows: list[Row]
+    folder: Path
+
+
+@pytest.fixture(scope="module")
+def done(client: Any, tmp_path_factory: pytest.TempPathFactory) -> Done:
+    """A job of a matrix, one that is refused, one whose scan is not there."""
+    folder = tmp_path_factory.mktemp("batch")
+    job = damaged_box.write_least(folder)
+    shutil.copy(folder / "scan.ply", folder / "second.ply")
     matrix = job.read_text().replace("scan: scan.ply\n", "matrix: {scan: [second.ply, gone.ply]}\n")
-    (tmp_path / "night.yaml").write_text(matrix)
-    (tmp_path / "faulty.yaml").write_text("version: 1\npart: [")
-    words = [job, tmp_path / "night.yaml", tmp_path / "faulty.yaml"]
-    rows = damageest.batch(words, client=client, output=tmp_path / "b")
+    (folder / "night.yaml").write_text(matrix)
+    (folder / "faulty.yaml").write_text("version: 1\npart: [")
+    shutil.copy(job, folder / "job.txt")
+    words = [job, folder / "night.yaml", folder / "faulty.yaml"]
+    rows = damageest.batch(words, client=client, output=folder / "b")
+    shutil.copytree(folder / "b/job", folder / "first")
+    return Done(words, rows, folder)
+
+
+def test_rows_of_a_batch(done: Done) -> None:
+    rows = done.rows
     assert [row.name for row in rows] == ["job", "night-second", "night-gone", "faulty"]
     assert [row.outcome for row in rows] == ["ok", "ok", "refused", "refused"]
     assert rows[0].verdict == "1 proven"
-    assert rows[0].damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.03)
+    assert rows[0].damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
     assert "gone.ply" in rows[2].error
-    assert {path.name for path in (tmp_path / "b").glob("batch.*")} == {"batch.csv", "batch.json", "batch.html"}
+    assert {path.name for path in (done.folder / "b").glob("batch.*")} == {"batch.csv", "batch.json", "batch.html"}
 
-    damageest.run(job, output=tmp_path / "b/alone")
-    assert without_times(tmp_path / "b/alone") == without_times(tmp_path / "b/job"), "the same bytes as damageest run"
 
+def test_a_job_of_a_batch_writes_the_same_bytes_as_a_run(done: Done) -> None:
+    job = done.folder / "job.yaml"
+    job.write_bytes((done.folder / "job.txt").read_bytes())
+    damageest.run(job, output=done.folder / "b/alone")
+    assert without_times(done.folder / "b/alone") == without_times(done.folder / "first")
+
+
+def test_a_batch_runs_again_what_has_changed(done: Done, client: Any) -> None:
     told: list[set[str]] = []
-    job.write_text(job.read_text() + "cluster: {neighbours: 9}\n")
+    job = done.folder / "job.yaml"
+    job.write_text((done.folder / "job.txt").read_text() + "cluster: {neighbours: 9}\n")
     again = damageest.batch(
-        words, client=client, output=tmp_path / "b", tell=lambda jobs, rows, active: told.append(set(rows))
+        done.words, client=client, output=done.folder / "b", tell=lambda jobs, rows, active: told.append(set(rows))
     )
     assert [row.outcome for row in again] == ["ok", "ok", "refused", "refused"]
-    assert again[1] == rows[1], "it did not run again"
-    assert again[0].key != rows[0].key
-    assert told[-1] == {row.name for row in rows}
+    assert again[1] == done.rows[1], "it did not run again"
+    assert again[0].key != done.rows[0].key
+    assert told[-1] == {row.name for row in done.rows}
 
 
-def test_the_page_shows_the_picture_of_the_report(tmp_path: Path) -> None:
+def test_the_page_shows_the_picture_of_the_report(small_done: Path, tmp_path: Path) -> None:
     """It comes from the report as a value, whatever its page looks like; a run without a report has none."""
     from PIL import Image
 
-    job = damaged_box.write_small(tmp_path)
-    row = run_one(job, "report=html")
-    write_page([row], tmp_path)
-    assert Image.open(tmp_path / ".b.png").size == (320, 240)
-    assert embed_png((tmp_path / ".b.png").read_bytes()) in (tmp_path / "batch.html").read_text()
-    write_page([run_one(job, "report=none")], tmp_path)
-    assert "data:image" not in (tmp_path / "batch.html").read_text()
+    def run_here(*settings: str) -> Row:
+        task = make_task(small_done, *settings) | {"output": str(tmp_path / "out/job")}
+        return read_row(task | run_job(task))
+
+    write_page([run_here("report=html")], tmp_path / "out")
+    assert Image.open(tmp_path / "out/.job.png").size == (320, 240)
+    assert embed_png((tmp_path / "out/.job.png").read_bytes()) in (tmp_path / "out/batch.html").read_text()
+    write_page([run_here("report=none")], tmp_path / "out")
+    assert "data:image" not in (tmp_path / "out/batch.html").read_text()
 
 
-HANGING = '''
+FAULTY = '''
 from damageest.artefacts import Part
 from damageest.stages.part import ReadPart
 
-class Hanging(ReadPart):
-    """Hangs."""
-    use: Literal["hanging"] = "hanging"
+class Faulty(ReadPart):
+    """Does what its option says."""
+    use: Literal["faulty"] = "faulty"
+    fault: str
     def run(self, unit: str) -> Part:
-        while True: pass
+        exec(self.fault)
 
 @hookimpl
 def damageest_stages():
-    return [Hanging]
+    return [Faulty]
 '''
+FAULTS = {
+    "exits": ("import os; os._exit(0)", "ended its process with exit status 0"),
+    "crashes": ("import ctypes; ctypes.string_at(0)", "segmentation fault (SIGSEGV)"),
+}
+HANGING = "part={use: faulty, fault: 'import time; time.sleep(600)'}"
 
 
-def run_one(job: Path, *settings: str, **limits: Any) -> Row:
+def make_task(job: Path, *settings: str, **limits: Any) -> dict[str, Any]:
     task = {
         "name": "job",
         "job": str(job),
@@ -121,18 +156,25 @@ def run_one(job: Path, *settings: str, **limits: Any) -> Row:
         "output": str(job.parent / "b"),
         "batch": "test",
     }
-    return read_row(work({**task, "memory": None, "timeout": 100, "stage_timeout": 60, "cache": True, **limits}))
+    return {**task, "memory": None, "timeout": 100, "stage_timeout": 60, "cache": True, **limits}
 
 
-FAULTS = {
-    "exits": ("import os; os._exit(0)", "ended its process with exit status 0"),
-    "crashes": ("import ctypes; ctypes.string_at(0)", "segmentation fault (SIGSEGV)"),
-}
+def run_one(job: Path, *settings: str, **limits: Any) -> Row:
+    return read_row(work(make_task(job, *settings, **limits)))
 
 
-@pytest.mark.parametrize("name", ["exits", pytest.param("crashes", marks=pytest.mark.slow)])
-def test_a_stage_that_ends_the_process_is_named(name: str, site: Site, tmp_path: Path) -> None:
+def test_a_stage_that_ends_the_process_is_named(site: Site, tmp_path: Path) -> None:
     """The stage has no process of its own: it takes the job's process with it, and the row says which stage it was."""
+    site.add("acme-bad", FAULTY)
+    body, text = FAULTS["exits"]
+    row = run_one(damaged_box.write_least(tmp_path), f"part={{use: faulty, fault: '{body}'}}")
+    assert row.outcome == "crashed"
+    assert row.error.startswith(f"part: faulty: {text}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_stage_of_a_site_that_ends_the_process_is_named(name: str, site: Site, tmp_path: Path) -> None:
     body, text = FAULTS[name]
     site.add("acme-bad", GROWN.replace(BODY, body))
     row = run_one(damaged_box.write_small(tmp_path, "allowance: doubled\n"))
@@ -142,15 +184,20 @@ def test_a_stage_that_ends_the_process_is_named(name: str, site: Site, tmp_path:
 
 
 def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
-    site.add("acme-hang", HANGING)
-    job = damaged_box.write_small(tmp_path)
+    site.add("acme-bad", FAULTY)
+    job = damaged_box.write_least(tmp_path)
     assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
-    row = run_one(job, "part=hanging", timeout=4)
+    row = run_one(job, HANGING, timeout=2)
     assert row.outcome == "timeout"
-    assert row.error == "part: hanging: was ended: not finished after 4 s, the time limit of a job"
-    row = run_one(job, "part=hanging", stage_timeout=1)
-    assert row.outcome == "timeout", "a stage without a process of its own has its time limit too"
-    assert row.error == "part: hanging: was ended: not finished after 1 s, the time limit of a stage"
+    assert row.error == "part: faulty: was ended: not finished after 2 s, the time limit of a job"
+
+
+def test_a_stage_of_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
+    """It has no process of its own."""
+    site.add("acme-bad", FAULTY)
+    row = run_one(damaged_box.write_least(tmp_path), HANGING, stage_timeout=0.5)
+    assert row.outcome == "timeout"
+    assert row.error == "part: faulty: was ended: not finished after 0.5 s, the time limit of a stage"
 
 
 BATCH = """
