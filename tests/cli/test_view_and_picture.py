@@ -8,6 +8,8 @@ import subprocess
 import sys
 import webbrowser
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -79,6 +81,53 @@ def test_a_window_needs_a_display(folder: Path, monkeypatch: pytest.MonkeyPatch)
         pictures.open_window(open_output(folder), 0)
 
 
+class Window:
+    """What `open_window` needs of a plotter, without OpenGL."""
+
+    def __init__(self, **_: object) -> None:
+        self.scalar_bars: dict[str, Any] = {}
+        self.switches: list[tuple[Any, bool]] = []
+        self.names: list[str] = []
+        self.actors: list[Any] = []
+        self.camera = SimpleNamespace(zoom=lambda factor: None)
+
+    def add_mesh(self, *_: object, **look: Any) -> Any:
+        self.actors.append(SimpleNamespace(visibility=True))
+        return self.actors[-1]
+
+    def add_checkbox_button_widget(self, switch: Any, value: bool, **_: object) -> None:
+        self.switches.append((switch, value))
+
+    def add_text(self, name: str, **_: object) -> None:
+        self.names.append(name)
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *_, **__: None
+
+
+def test_each_layer_of_the_window_has_a_switch(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Which layers are shown at first, and that each switch shows and hides its own."""
+    import pyvista
+
+    opened: list[Window] = []
+    monkeypatch.setenv("DISPLAY", ":99")
+    monkeypatch.setattr(pyvista, "Plotter", lambda **named: opened.append(Window(**named)) or opened[-1])
+    pictures.open_window(open_output(folder), 1)
+    (window,) = opened
+    shown = {name: value for name, (_, value) in zip(window.names, window.switches, strict=True)}
+    assert {name for name, on in shown.items() if on} == {"part", "damage volumes"}
+    assert {name for name, on in shown.items() if not on} == {"inner damage surfaces", "scan", "damage points"}
+    for switch, on in window.switches:
+        before = [actor.visibility for actor in window.actors]
+        switch(not on)
+        changed = [k for k, actor in enumerate(window.actors) if actor.visibility != before[k]]
+        assert changed
+        assert all(window.actors[k].visibility is not on for k in changed)
+        switch(on)
+        assert [actor.visibility for actor in window.actors] == before
+
+
+@pytest.mark.slow
 @pytest.mark.skipif(not shutil.which("xvfb-run"), reason="there is no virtual display: apt-get install xvfb xauth")
 def test_each_switch_of_the_window_changes_what_is_shown(folder: Path) -> None:
     script = [sys.executable, "-m", "tests.cli.windowed", str(folder)]
@@ -112,6 +161,7 @@ def test_a_picture_shows_the_damage(folder: Path, tmp_path: Path) -> None:
     assert red[120:, 160:].sum() > 3 * red[120:, :160].sum(), "the site is seen from near"
 
 
+@pytest.mark.slow
 def test_a_picture_shows_the_path_and_what_it_does_not_reach(folder: Path, tmp_path: Path) -> None:
     from PIL import Image
 
