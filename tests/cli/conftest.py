@@ -1,8 +1,9 @@
-"""One run of the command line as a process, for all tests of what it prints and writes."""
+"""Runs that several tests of the command line read."""
 
 from __future__ import annotations
 
 import json
+import shutil
 import subprocess
 import sys
 import time
@@ -11,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+import damageest
+from damageest.registry import Registry
 from tests import damaged_box
 from tests.kept import keep
 
@@ -41,3 +44,20 @@ def command_run(test_run: Path) -> Ran:
 
     folder = keep(test_run, "command_run", make)
     return Ran(folder, *json.loads((folder / "told").read_text()))
+
+
+@pytest.fixture(scope="session")
+def least_job(test_run: Path, registry: Registry) -> Path:
+    """The folder of the job of `damaged_box.write_least`, with its output ``out/job``. Nobody changes it."""
+
+    def make(folder: Path) -> None:
+        damageest.run(damaged_box.write_least(folder), registry=registry, output=True)
+
+    return keep(test_run, "least_job", make)
+
+
+@pytest.fixture
+def least_done(least_job: Path, tmp_path: Path) -> Path:
+    """A copy of that job in ``tmp_path``: the job file."""
+    shutil.copytree(least_job, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "job.yaml"

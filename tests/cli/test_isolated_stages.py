@@ -107,12 +107,12 @@ def test_sys_exit_in_a_stage_without_a_process_of_its_own(site: Site, small_done
 
 
 def test_method_auto_goes_on_after_a_crash(
-    site: Site, small_done: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+    site: Site, least_done: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     """The site that is lost to the crash is found by the other method. What a worker prints goes to the error
     stream."""
     site.add("acme-once", ONCE)
-    result = damageest.run(small_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
+    result = damageest.run(least_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
     assert (tmp_path / "crashed").exists()
     assert result.status == "ok"
     assert [item.method for item in result.sites] == ["surface"]
