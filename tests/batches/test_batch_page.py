@@ -57,7 +57,7 @@ def chromium() -> Iterator[Any]:
         yield opened
 
 
-@pytest.mark.parametrize("count", [1500, pytest.param(10_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [700, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_many_rows_in_a_browser(count: int, chromium: Any, tmp_path: Path) -> None:
     """Those to look at come first; others are drawn when they are scrolled to, searched for or sorted to the front."""
     good = {"verdicts": {"proven": 1}, "damage_volume": 2.0, "volume_95": (1.0, None), "units": "mm", "sites": 1}

@@ -98,10 +98,17 @@ def test_init_writes_a_job_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyP
     status, said = call_here("init", "box.stl", "scan.ply", "--job", "new.yaml")
     assert status == 0, said
     assert "noise 0.04" in (tmp_path / "new.yaml").read_text()
-    assert call_here("run", "new.yaml", "--set", "tolerance=0.6")[0] == 0
-    status, said = call_here("init", "box.stl", "scan.ply", "--job", "new.yaml")
+    quick = ("--set", "tolerance=0.6", "--set", "align=none")
+    assert call_here("run", "new.yaml", *quick)[0] == 0
+
+
+def test_init_replaces_no_job_that_is_there(tmp_path: Path) -> None:
+    job = damaged_box.write_least(tmp_path)
+    before = job.read_bytes()
+    status, said = call_here("init", tmp_path / "box.stl", tmp_path / "scan.ply", "--job", job)
     assert status == 2
     assert "--force" in said
+    assert job.read_bytes() == before
 
 
 @pytest.mark.slow
