@@ -82,3 +82,8 @@ def test_a_place_that_cannot_be_written_is_named_before_anything_runs(output: st
     (tmp_path / "job.yaml").write_text("version: 1\n")
     with pytest.raises(JobError, match="cannot be written"):
         batch(tmp_path / "job.yaml", output=tmp_path / output)
+
+
+def test_an_old_table_of_any_depth_is_none(tmp_path: Path) -> None:
+    (tmp_path / "batch.json").write_text("[" * 200_000)
+    assert read_rows(tmp_path) == {}

@@ -7,6 +7,7 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
@@ -27,7 +28,7 @@ def test_a_sound_installation_gives_the_true_volume() -> None:
 
 
 def test_a_wrong_volume_and_a_missing_extra_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "JOB", doctor.JOB.replace("radius: 6.0", "radius: 5.0"))
+    monkeypatch.setattr("damageest.api.run", lambda job: SimpleNamespace(damage_volume=261.8))
     monkeypatch.setattr(doctor, "_has", lambda extra: extra != "report")
     done = CliRunner().invoke(app, ["doctor"])
     assert done.exit_code == 1

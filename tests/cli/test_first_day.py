@@ -27,7 +27,7 @@ def call(*words: str | Path) -> tuple[int, str]:
 def test_a_new_job_is_valid_and_names_schema_methods_and_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    damaged_box.write(tmp_path)
+    damaged_box.write_least(tmp_path)
     monkeypatch.chdir(tmp_path)
     assert call("init", "box.stl", "scan.ply", "-o", "chip.yaml")[0] == 0
     text = Path("chip.yaml").read_text()
@@ -41,7 +41,7 @@ def test_a_new_job_is_valid_and_names_schema_methods_and_output(
 
 
 def test_part_and_scan_swapped_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    damaged_box.write(tmp_path)
+    damaged_box.write_least(tmp_path)
     monkeypatch.chdir(tmp_path)
     status, said = call("init", "scan.ply", "box.stl")
     assert status == 2
@@ -49,7 +49,7 @@ def test_part_and_scan_swapped_are_named(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_folder_is_no_job_and_its_jobs_are_listed(tmp_path: Path) -> None:
-    damaged_box.write(tmp_path)
+    damaged_box.write_least(tmp_path)
     status, said = call("run", tmp_path)
     assert status == 2
     assert "job.yaml" in said
@@ -60,7 +60,7 @@ def test_a_folder_is_no_job_and_its_jobs_are_listed(tmp_path: Path) -> None:
     ("setting", "wrong"), [("export.format=dxf", "dxf"), ("tolerance=-1", "-1"), ("cluster.link=2", "link")]
 )
 def test_a_wrong_setting_is_named_and_not_a_line_of_the_file(setting: str, wrong: str, tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path)
+    job = damaged_box.write_least(tmp_path)
     status, said = call("validate", job, "--set", setting)
     assert status == 2
     assert said.startswith(f"--set {setting}: ")
@@ -69,7 +69,8 @@ def test_a_wrong_setting_is_named_and_not_a_line_of_the_file(setting: str, wrong
 
 
 def test_a_run_that_fails_leaves_no_hidden_folder(tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path, damaged_box.JOB.replace("align: none", "align: {use: none, T_part_scan: T}"))
+    job = damaged_box.write_least(tmp_path)
+    job.write_text(job.read_text().replace("align: none", "align: {use: none, T_part_scan: T}"))
     far = "[[1, 0, 0, 90], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"
     job.write_text(job.read_text().replace("T}", f"{far}}}"))
     assert call("run", "-q", job)[0] == 1

@@ -1,0 +1,113 @@
+"""One job of a batch, in a process of its own: a row, whatever becomes of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from damageest.batches.page import write_page
+from damageest.batches.rows import Row, read_row
+from damageest.batches.work import run_job, work
+from damageest.io.files import embed_png
+from damageest.isolation import end_workers
+from tests import damaged_box
+from tests.registry.test_registry import GROWN, Site, site
+
+__all__ = ["site"]
+BODY = "return Solid(damage.vertices * self.factor, damage.faces)"
+FAULTY = '''
+from damageest.artefacts import Part
+from damageest.stages.part import ReadPart
+
+class Faulty(ReadPart):
+    """Does what its option says."""
+    use: Literal["faulty"] = "faulty"
+    fault: str
+    def run(self, unit: str) -> Part:
+        exec(self.fault)
+
+@hookimpl
+def damageest_stages():
+    return [Faulty]
+'''
+FAULTS = {
+    "exits": ("import os; os._exit(0)", "ended its process with exit status 0"),
+    "crashes": ("import ctypes; ctypes.string_at(0)", "segmentation fault (SIGSEGV)"),
+}
+HANGING = "part={use: faulty, fault: 'import time; time.sleep(600)'}"
+
+
+def make_task(job: Path, *settings: str, **limits: Any) -> dict[str, Any]:
+    task = {
+        "name": "job",
+        "job": str(job),
+        "settings": list(settings),
+        "output": str(job.parent / "b"),
+        "batch": "test",
+    }
+    return {**task, "memory": None, "timeout": 100, "stage_timeout": 60, "cache": True, **limits}
+
+
+def run_one(job: Path, *settings: str, **limits: Any) -> Row:
+    return read_row(work(make_task(job, *settings, **limits)))
+
+
+@pytest.fixture(autouse=True)
+def _end() -> Iterator[None]:
+    yield
+    end_workers()
+
+
+def test_the_page_shows_the_picture_of_the_report(small_done: Path, tmp_path: Path) -> None:
+    """It comes from the report as a value, whatever its page looks like; a run without a report has none."""
+    from PIL import Image
+
+    def run_here(*settings: str) -> Row:
+        task = make_task(small_done, *settings) | {"output": str(tmp_path / "out/job")}
+        return read_row({name: task[name] for name in ("name", "job", "settings", "output")} | run_job(task))
+
+    write_page([run_here("report=html")], tmp_path / "out")
+    assert Image.open(tmp_path / "out/.job.png").size == (320, 240)
+    assert embed_png((tmp_path / "out/.job.png").read_bytes()) in (tmp_path / "out/batch.html").read_text()
+    write_page([run_here("report=none")], tmp_path / "out")
+    assert "data:image" not in (tmp_path / "out/batch.html").read_text()
+
+
+def test_a_stage_that_ends_the_process_is_named(site: Site, tmp_path: Path) -> None:
+    """The stage has no process of its own: it takes the job's process with it, and the row says which stage it was."""
+    site.add("acme-bad", FAULTY)
+    body, text = FAULTS["exits"]
+    row = run_one(damaged_box.write_least(tmp_path), f"part={{use: faulty, fault: '{body}'}}")
+    assert row.outcome == "crashed"
+    assert row.error.startswith(f"part: faulty: {text}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_stage_of_a_site_that_ends_the_process_is_named(name: str, site: Site, tmp_path: Path) -> None:
+    body, text = FAULTS[name]
+    site.add("acme-bad", GROWN.replace(BODY, body))
+    row = run_one(damaged_box.write_small(tmp_path, "allowance: doubled\n"))
+    assert row.outcome == "crashed"
+    assert row.error.startswith("allowance: doubled (site 1): ")
+    assert text in row.error
+
+
+def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
+    site.add("acme-bad", FAULTY)
+    job = damaged_box.write_least(tmp_path)
+    assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
+    row = run_one(job, HANGING, timeout=2)
+    assert row.outcome == "timeout"
+    assert row.error == "part: faulty: was ended: not finished after 2 s, the time limit of a job"
+
+
+def test_a_stage_of_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
+    """It has no process of its own."""
+    site.add("acme-bad", FAULTY)
+    row = run_one(damaged_box.write_least(tmp_path), HANGING, stage_timeout=0.5)
+    assert row.outcome == "timeout"
+    assert row.error == "part: faulty: was ended: not finished after 0.5 s, the time limit of a stage"
