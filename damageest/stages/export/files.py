@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -23,6 +23,7 @@ from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, MILLED, 
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
 from damageest.stages.export._options import Formats, MachineFile, PathFormats, PathOption, check_spline_writer
+from damageest.stages.export._path_checks import check_paths
 from damageest.stages.export._paths import write_paths
 from damageest.stages.export._scan_points import PointColours, write_scan
 
@@ -100,6 +101,10 @@ class Files(Export):
         description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54), "
         "rotary (AC, BC, none, auto), tcp (control, machine, table), tcpm_on, tcpm_off (G43.4 H1, G49), pivot",
     )
+
+    def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
+        """What the writers of paths cannot do, where the job plans some or names a machine."""
+        return check_paths(self, job.get("path"), registry.path_writers)
 
     def run(
         self,
