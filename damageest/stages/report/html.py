@@ -48,8 +48,9 @@ class Html(Report):
 
     @model_validator(mode="after")
     def _check_pdf(self) -> Self:
-        if self.pdf and find_spec("reportlab") is None:
-            raise ValueError('pdf: needs the package reportlab; install it:  pip install "damageest[pdf]"')
+        lacking = [module for module in ("reportlab", "k3d", "PIL") if self.pdf and find_spec(module) is None]
+        if lacking:
+            raise ValueError(f'pdf: needs the package {lacking[0]}; install it:  pip install "damageest[pdf]"')
         return self
 
     def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
