@@ -18,7 +18,7 @@ from damageest.geometry.touching import ROUNDS, separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply
 from damageest.stages import JobPath
-from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWriter, Writer
+from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathSettings, PathWriter, Writer
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, MILLED, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
@@ -104,7 +104,9 @@ class Files(Export):
 
     def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
         """What the writers of paths cannot do, where the job plans some or names a machine."""
-        return check_paths(self, job.get("path"), registry.path_writers)
+        settings = PathSettings("mm", "check", options=self.path_options, machine=self.machine)
+        templates = {"path_header": self.path_header, "path_footer": self.path_footer}
+        return check_paths(self.paths, settings, templates, job.get("path"), registry.path_writers)
 
     def run(
         self,
