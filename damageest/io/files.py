@@ -158,8 +158,8 @@ def check_output_file(path: Path, option: str) -> None:
 def check_output_folder(folder: Path, option: str) -> None:
     """The same for a folder, which is made with its parents where it is missing."""
     there = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), folder)
-    if not there.is_dir():
-        what = "a symbolic link that leads nowhere" if not there.exists() else "a file"
+    if not os.path.isdir(there):  # which raises nothing, whatever the rights
+        what = "a file" if os.path.exists(there) else "a symbolic link that leads nowhere"
         raise _refuse(f"{there} is {what}, not a folder; name another folder", option)
     if not os.access(there, os.W_OK | os.X_OK):
         raise _refuse(f"the folder {there} cannot be written; name another, or change its rights", option)
