@@ -43,7 +43,7 @@ def test_a_foreign_underscore_is_found() -> None:
 def test_few_modules_lie_at_the_top() -> None:
     top = {path.name for path in (ROOT / "damageest").glob("*.py")}
     assert top == {
-        "__init__.py", "api.py", "error_codes.py", "errors.py", "findings.py", "options.py", "result.py",
+        "__init__.py", "__main__.py", "api.py", "error_codes.py", "errors.py", "findings.py", "options.py", "result.py",
     }  # fmt: skip
 
 

@@ -6,22 +6,13 @@ import os
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from damageest.cli import app
-from damageest.errors import DamageestError, StageError
+from damageest.errors import StageError
 from damageest.job import yamlfile
 from damageest.output.deviation_json import report_deviation
 from damageest.pipeline.fallback import drop_tried
 from tests import damaged_box
-
-
-def call(*words: str | Path) -> tuple[int, str]:
-    """Exit status and all output of a command in this process."""
-    done = CliRunner().invoke(app, [str(word) for word in words])
-    if isinstance(done.exception, DamageestError):  # `main` prints it
-        return done.exception.exit_status, f"{done.output}error: {done.exception}"
-    return done.exit_code, done.output
+from tests.cli.calls import call
 
 
 def test_a_new_job_is_valid_and_names_schema_methods_and_output(
@@ -68,13 +59,16 @@ def test_a_wrong_setting_is_named_and_not_a_line_of_the_file(setting: str, wrong
     assert "job.yaml" not in said
 
 
-def test_a_run_that_fails_leaves_no_hidden_folder(tmp_path: Path) -> None:
+def test_a_run_that_fails_keeps_its_stages_and_leaves_nothing_else(tmp_path: Path) -> None:
     job = damaged_box.write_least(tmp_path)
     job.write_text(job.read_text().replace("align: none", "align: {use: none, T_part_scan: T}"))
     far = "[[1, 0, 0, 90], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"
     job.write_text(job.read_text().replace("T}", f"{far}}}"))
     assert call("run", "-q", job)[0] == 1
-    assert os.listdir(tmp_path / "out") == []
+    assert os.listdir(tmp_path / "out") == ["job"]
+    assert os.listdir(tmp_path / "out/job") == ["stages"]
+    assert {path.name.split("-")[0] for path in (tmp_path / "out/job/stages").iterdir()} >= {"part", "scan"}
+    assert "no result.json" in call("view", tmp_path / "out/job")[1]
 
 
 def test_aliases_that_expand_without_end_are_refused(tmp_path: Path) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 import sys
@@ -204,20 +203,6 @@ def test_a_picture_shows_the_path_and_what_it_does_not_reach(folder: Path, tmp_p
     violet = (image[..., 2] > image[..., 1] + 25) & (image[..., 0] > image[..., 1] + 15)
     assert red.sum() > 100
     assert violet.sum() > 20
-
-
-def die(**_: object) -> None:
-    os.abort()
-
-
-def test_a_machine_without_opengl_says_what_to_install(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(pictures, "draw_here", die)
-    with pytest.raises(StageError, match="no OpenGL") as caught:
-        pictures.draw_picture(pictures.Picture((open_output(folder),), (0,)), tmp_path / "picture.png")
-    assert "libegl1" in str(caught.value)
-    assert not (tmp_path / "picture.png").exists()
 
 
 @pytest.mark.parametrize(

@@ -48,9 +48,20 @@ class Html(Report):
 
     @model_validator(mode="after")
     def _check_pdf(self) -> Self:
-        if self.pdf and find_spec("reportlab") is None:
-            raise ValueError('pdf: needs the package reportlab; install it:  pip install "damageest[pdf]"')
+        lacking = [module for module in ("reportlab", "k3d", "PIL") if self.pdf and find_spec(module) is None]
+        if lacking:
+            raise ValueError(f'pdf: needs the package {lacking[0]}; install it:  pip install "damageest[pdf]"')
         return self
+
+    def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
+        """A logo that is no picture."""
+        if not self.pdf or self.logo is None or not self.logo.is_file():
+            return []
+        with self.logo.open("rb") as stream:
+            start = stream.read(8)
+        if start.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
+            return []
+        return [(("logo",), f"{self.logo} is neither PNG nor JPEG; save it as one of them")]
 
     def run(self, result: Result, folder: Path, content: Mapping[str, Any], job_text: str) -> ReportFiles:
         """Writes ``report.html``, and ``report.pdf`` where it is asked for, into ``folder``."""
