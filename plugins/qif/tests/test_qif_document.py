@@ -154,7 +154,7 @@ def test_each_kind_of_result_is_valid(tmp_path: Path, schema: etree.XMLSchema, r
         assert "foot & <top>" in [one.findtext(f"{Q}Name") for one in root.iter(f"{Q}Entity")]
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=10, deadline=None)
 @given(text=st.text(max_size=30))
 def test_any_text_is_written(tmp_path_factory: pytest.TempPathFactory, result: Result, text: str) -> None:
     folder = tmp_path_factory.mktemp("text")
