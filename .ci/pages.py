@@ -3,9 +3,9 @@
 
 .ci/pages.py [--user N] [--only PAGE ...] CHECKOUT
 
-works in the folder where it is called: the README's first commands clone CHECKOUT there, and each page begins with what
-they left. Of each command it prints exit status, seconds and megabytes received, of each page those on disk, and it ends
-with 1 where one failed. With `--user`, called by root, `apt-get` alone is run as root, and all else as the user N.
+works in the folder where it is called: the README's first commands clone CHECKOUT there, and each page begins with
+what they left. Of each command it prints exit status, seconds and megabytes received, of each page those on disk,
+and it ends with 1 where one failed. With `--user`, called by root, `apt-get` alone is run as root, and all else as the user N.
 
 Above a block, a page may say in a comment `<!-- not run: REASON -->`, or `<!-- file: PATH -->` where the reader saves
 it. A line that ends with `# exit status 1` is to end so.
