@@ -4,8 +4,8 @@
 .ci/pages.py [--user N] [--only PAGE ...] CHECKOUT
 
 works in the folder where it is called: the README's first commands clone CHECKOUT there, and each page begins with
-what they left. Of each command it prints exit status, seconds and megabytes received, of each page those on disk,
-and it ends with 1 where one failed. With `--user`, called by root, `apt-get` alone is run as root, and all else as the user N.
+what they left. Of each command it prints exit status, seconds and megabytes received, of each page those on disk, and
+it ends with 1 where one failed. With `--user`, called by root, `apt-get` alone is run as root, all else as the user N.
 
 Above a block, a page may say in a comment `<!-- not run: REASON -->`, or `<!-- file: PATH -->` where the reader saves
 it. A line that ends with `# exit status 1` is to end so.
@@ -72,9 +72,14 @@ class Reader:
     failed: int = 0
 
     def begin(self, folder: Path) -> None:
-        for name, text in ((".pages-folder", f"{folder}\n"), (".pages-environment", "")):
-            (self.home / name).write_text(text)
-            os.chown(self.home / name, self.user or -1, -1)
+        self.save(self.home / ".pages-folder", f"{folder}\n")
+        self.save(self.home / ".pages-environment", "")
+
+    def save(self, path: Path, text: str) -> None:
+        path.parent.mkdir(exist_ok=True)
+        path.write_text(text)
+        for place in (path.parent, path):
+            os.chown(place, self.user or -1, -1)
 
     def type_in(self, command: str) -> subprocess.CompletedProcess[str]:
         place, state = self.home / ".pages-folder", self.home / ".pages-environment"
@@ -133,7 +138,7 @@ def main() -> int:
                 raise SystemExit(f"{line}\n{done.stdout}{done.stderr}")
         for block in blocks if wanted else blocks[:1]:
             if block.file:
-                (clone / block.file).write_text(block.text)
+                reader.save(clone / block.file, block.text)
             elif block.skipped:
                 print(f"     -  not run: {block.skipped}: {block.commands()[0]}", flush=True)
             else:
