@@ -108,19 +108,24 @@ class Reader:
         )
 
 
+def first_run(blocks: list[Block]) -> list[Block]:
+    """The commands up to the first one of damageest."""
+    commands = blocks[0].commands()
+    last = next(k for k, command in enumerate(commands) if command.startswith("damageest"))
+    return [Block("\n".join(commands[: last + 1]))]
+
+
 def list_resets(root: Path) -> Iterator[str]:
     """What takes a clone back to what the README's first commands left."""
     yield "git checkout -q . && git clean -fdxq -e /.venv -e /.uv -e /uv.lock -e __pycache__"
-    start = "\n".join(read_blocks(root / START)[0].commands())
-    yield next(line for line in start.splitlines() if line.startswith(".uv/bin/uv sync")) + " -q"
-    yield next(line for line in start.splitlines() if "activate" in line)
+    yield next(line for line in read_blocks(root / START)[0].commands() if line.startswith(".uv/bin/uv sync"))
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--user", type=int, default=0)
     parser.add_argument(
-        "--only", nargs="*", default=[], help="names of pages, as cam.md; README.md's first block is run anyway"
+        "--only", nargs="*", default=[], help="names of pages, as cam.md; README.md's first commands are run anyway"
     )
     parser.add_argument("checkout", type=Path)
     given = parser.parse_args()
@@ -136,7 +141,7 @@ def main() -> int:
         for line in () if is_start else list_resets(root):
             if (done := reader.type_in(line)).returncode:
                 raise SystemExit(f"{line}\n{done.stdout}{done.stderr}")
-        for block in blocks if wanted else blocks[:1]:
+        for block in blocks if wanted else first_run(blocks):
             if block.file:
                 reader.save(clone / block.file, block.text)
             elif block.skipped:
