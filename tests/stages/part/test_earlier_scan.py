@@ -27,6 +27,7 @@ def compare(folder: Path, drawn: DrawnPair, before: Floats | None = None, **job:
     return damageest.run({"version": 1, "part": part, "scan": str(folder / "after.npy"), **job})
 
 
+@pytest.mark.slow
 def test_a_chip_between_two_partial_scans_in_other_poses_has_its_volume(tmp_path: Path) -> None:
     drawn = draw_pair(Pair("", "block", CHIP, **FEW), 1)
     result = compare(tmp_path, drawn)
@@ -42,6 +43,7 @@ def test_a_chip_between_two_partial_scans_in_other_poses_has_its_volume(tmp_path
     assert result.coverage.seen > 0.85  # of the skin that the earlier scan shows
 
 
+@pytest.mark.slow
 def test_where_nothing_changed_nothing_is_found(tmp_path: Path) -> None:
     result = compare(tmp_path, draw_pair(Pair("", "bracket", **FEW), 2))
     assert result.status == "ok"
