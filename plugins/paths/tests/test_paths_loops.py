@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -17,7 +17,10 @@ from damageest.geometry.vectors import normalise
 from tests.needs import import_or_skip
 
 numba = import_or_skip("numba")
-compiling = import_or_skip("damageest_paths.compiling")
+if TYPE_CHECKING:
+    from damageest_paths import compiling
+else:
+    compiling = import_or_skip("damageest_paths.compiling")
 
 CONES = {
     "nozzle": Cone(1.0, 4.0, 12.0, np.radians(20)),
