@@ -8,10 +8,22 @@ from pathlib import Path
 
 import pytest
 
-from tests.needs import PLUGINS, explain_import_error, find_unusable
+from tests.needs import PLUGINS, explain_import_error, find_unusable, import_or_skip
 from tests.optional_imports import ROOT
 
 PLUGIN_TESTS = {ROOT / "plugins" / plugin / "tests": plugin for plugin in PLUGINS}
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    config.addinivalue_line("markers", "needs(module, ...): skipped where one of the modules cannot be imported")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtest_setup(item: pytest.Item) -> None:
+    """Imports what the mark `needs` names, before fixtures do: of a test whose product code needs a package."""
+    for mark in item.iter_markers("needs"):
+        for module in mark.args:
+            import_or_skip(module)
 
 
 @pytest.hookimpl(wrapper=True)

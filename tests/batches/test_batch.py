@@ -22,6 +22,8 @@ from damageest.batches.rows import Row
 from damageest.isolation import end_workers
 from tests import damaged_box
 
+pytestmark = pytest.mark.needs("distributed")
+
 
 @pytest.fixture(scope="module")
 def client() -> Iterator[Any]:

@@ -77,6 +77,7 @@ def test_tables_are_written_while_a_batch_runs(tmp_path: Path, monkeypatch: pyte
     tables.close()
 
 
+@pytest.mark.needs("distributed")
 @pytest.mark.parametrize("output", ["job.yaml/out", "a" * 300])
 def test_a_place_that_cannot_be_written_is_named_before_anything_runs(output: str, tmp_path: Path) -> None:
     (tmp_path / "job.yaml").write_text("version: 1\n")
