@@ -17,6 +17,8 @@ from tests import damaged_box
 from tests.registry.test_registry import GROWN, Site, site
 
 __all__ = ["site"]
+
+pytestmark = pytest.mark.needs("distributed")
 BODY = "return Solid(damage.vertices * self.factor, damage.faces)"
 FAULTY = '''
 from damageest.artefacts import Part
