@@ -144,9 +144,8 @@ def test_a_module_without_hooks_provides_nothing(site: Site) -> None:
     assert "acme-empty 1.2  MIT  no stages" in CliRunner().invoke(app, ["plugins"]).output
 
 
-@pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, -signal.SIGTERM, marks=pytest.mark.slow)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)])
 def test_a_stage_that_hangs_can_be_stopped(
     number: int, status: int, site: Site, tiny_done: Path, tmp_path: Path
 ) -> None:
@@ -194,8 +193,10 @@ def test_an_interrupted_import_is_no_fault_of_the_plugin(place: str, site: Site,
         "run": STOPPED + GROWN.replace(BODY, "raise stopped"),
     }[place]
     site.add("acme-stopped", source)
+    before = damaged_box.content(tiny_done.parent / "out")
     with pytest.raises(KeyboardInterrupt):
         damageest.run(tiny_done, settings=["allowance=doubled"], output=True)
+    assert damaged_box.content(tiny_done.parent / "out") == before
 
 
 def test_a_plugin_that_lacks_a_library_is_broken_with_a_remedy(site: Site) -> None:

@@ -170,7 +170,8 @@ def test_the_second_job_runs_after_an_error_that_is_no_exception(site: Site, tmp
     assert (tmp_path / "good" / "out" / "job" / "result.json").exists()
 
 
-@pytest.mark.parametrize("what", [pytest.param("GeneratorExit", marks=pytest.mark.slow), "KeyboardInterrupt"])
+@pytest.mark.slow
+@pytest.mark.parametrize("what", ["GeneratorExit", "KeyboardInterrupt"])
 def test_a_job_of_a_batch_names_the_stage_and_the_plugin(what: str, site: Site, tmp_path: Path) -> None:
     """What a Dask worker calls: it gives a row, whatever the job raises."""
     site.add("acme-bad", STAGES)

