@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from damageest.errors import DamageestError, StageError
+from damageest.errors import DamageestError, StageError, describe_install
 from damageest.output import pictures
 from damageest.output.folder import OutputFolder, open_output
 from damageest.output.pictures import Picture, draw_picture, open_window
@@ -67,8 +67,8 @@ def lose_pillow(**_: object) -> None:
 @pytest.mark.parametrize(
     ("draw", "said", "remedy"),
     [
-        (lose_pyvista, "pyvista is not installed", 'pip install "damageest[vtk]"'),
-        (lose_pillow, "PIL is not installed", 'pip install "damageest[report]"'),
+        (lose_pyvista, "pyvista is not installed", describe_install("vtk")),
+        (lose_pillow, "PIL is not installed", describe_install("report")),
         (lose_opengl, "no OpenGL (libGL.so.1", "apt-get install libegl1"),
         (lose_library, "libXrender.so.1 is missing", "the package that has libXrender.so.1"),
         (fail_in_vtk, "no OpenGL, or its graphics driver failed", "apt-get install libegl1"),
@@ -108,7 +108,7 @@ def test_a_window_without_pyvista_names_it(folder: OutputFolder, monkeypatch: py
     without("pyvista", monkeypatch)
     with pytest.raises(StageError, match="pyvista is not installed") as caught:
         open_window(folder, 0)
-    assert caught.value.remedy == 'pip install "damageest[vtk]"'
+    assert caught.value.remedy == describe_install("vtk")
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere there is always a display")

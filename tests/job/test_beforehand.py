@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from damageest.errors import JobError
+from damageest.errors import JobError, describe_install
 from damageest.job import beforehand, load
 from damageest.registry import Registry
 from tests import damaged_box
@@ -48,7 +48,7 @@ def test_a_package_of_the_method(home: Path, registry: Registry, monkeypatch: py
     monkeypatch.setattr(beforehand, "find_spec", lambda name: None)
     (fault,) = find_faults(home, registry, "method: surface\n")
     assert "'pyvista' cannot run: the Python module pyvista is not installed" in fault
-    assert 'pip install "damageest[vtk]"' in fault
+    assert describe_install("vtk") in fault
     assert not find_faults(home, registry, ""), "it is only tried where the other method fails"
 
 
