@@ -27,7 +27,7 @@ def call(*words: object, cwd: Path | None = None) -> subprocess.CompletedProcess
 
 def test_run_prints_a_table_and_writes_the_folder(command_run: Ran) -> None:
     assert "implicit" in command_run.stdout
-    assert "proven" in command_run.stdout
+    assert "likely" in command_run.stdout
     assert "the scan shows 100% of the skin" in command_run.stdout
     stages = [line.split(":")[0].strip() for line in command_run.stderr.splitlines() if ":" in line]
     assert stages[:2] == ["part", "scan"]

@@ -73,7 +73,7 @@ def damageest_stages():
 '''
 
 
-def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(site: Site, tmp_path: Path) -> None:
+def test_an_interrupt_says_what_is_kept_and_the_next_run_takes_it(site: Site, tmp_path: Path) -> None:
     site.add("acme-waiting", WAITING)
     job = damaged_box.write_least(tmp_path, f"segment: {{use: waiting, mark: {tmp_path / 'mark'}}}\n")
     process = subprocess.Popen(
@@ -88,7 +88,7 @@ def test_an_interrupt_says_what_is_kept_and_leaves_nothing_hidden(site: Site, tm
     kept = tmp_path / "out/job/stages"
     assert f"interrupted in segment: waiting; kept in {kept}: part, scan, align;" in text
     assert text.splitlines()[-1].startswith("interrupted")
-    assert [path.name for path in (tmp_path / "out").iterdir()] == ["job"]
+    assert [path.name for path in (tmp_path / "out").iterdir()] == ["job"], "nothing hidden"
     (tmp_path / "mark").touch()
     again = CliRunner().invoke(app, ["run", str(job)])
     assert "waited enough" in again.stderr
