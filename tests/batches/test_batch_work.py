@@ -89,7 +89,7 @@ def test_a_stage_that_ends_the_process_is_named(site: Site, tmp_path: Path) -> N
     site.add("acme-bad", FAULTY)
     body, text = FAULTS["exits"]
     row = run_one(damaged_box.write_least(tmp_path), f"part={{use: faulty, fault: '{body}'}}")
-    assert row.outcome == "crashed"
+    assert row.outcome == "crashed", row.error
     assert row.error.startswith(f"part: faulty: {text}")
 
 
@@ -99,7 +99,7 @@ def test_a_stage_of_a_site_that_ends_the_process_is_named(name: str, site: Site,
     body, text = FAULTS[name]
     site.add("acme-bad", GROWN.replace(BODY, body))
     row = run_one(damaged_box.write_small(tmp_path, "allowance: doubled\n"))
-    assert row.outcome == "crashed"
+    assert row.outcome == "crashed", row.error
     assert row.error.startswith("allowance: doubled (site 1): ")
     assert text in row.error
 
@@ -109,7 +109,7 @@ def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     job = damaged_box.write_least(tmp_path)
     assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
     row = run_one(job, HANGING, timeout=2)
-    assert row.outcome == "timeout"
+    assert row.outcome == "timeout", row.error
     assert row.error == "part: faulty: was ended: not finished after 2 s, the time limit of a job"
 
 
@@ -117,5 +117,5 @@ def test_a_stage_of_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> Non
     """It has no process of its own."""
     site.add("acme-bad", FAULTY)
     row = run_one(damaged_box.write_least(tmp_path), HANGING, stage_timeout=0.5)
-    assert row.outcome == "timeout"
+    assert row.outcome == "timeout", row.error
     assert row.error == "part: faulty: was ended: not finished after 0.5 s, the time limit of a stage"

@@ -243,8 +243,8 @@ def test_a_crash_after_ctrl_c_is_an_end_by_ctrl_c(site: Site, tmp_path: Path) ->
     )
     part = add_reader(site, tmp_path, body)
     with subprocess.Popen(
-        [*MAIN[:-1], "faces", str(part)], stderr=subprocess.PIPE, text=True, env=environment(site), start_new_session=True,
-        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        [*MAIN[:-1], "faces", str(part)], stderr=subprocess.PIPE, text=True, env=environment(site),
+        start_new_session=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as child:  # fmt: skip
         end = time.monotonic() + 60
         while not mark.exists():
