@@ -73,7 +73,8 @@ def damageest_stages():
 '''
 
 
-def test_an_interrupt_says_what_is_kept_and_the_next_run_takes_it(site: Site, tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_run_again", [False, pytest.param(True, marks=pytest.mark.slow)])
+def test_an_interrupt_says_what_is_kept(is_run_again: bool, site: Site, tmp_path: Path) -> None:
     site.add("acme-waiting", WAITING)
     job = damaged_box.write_least(tmp_path, f"segment: {{use: waiting, mark: {tmp_path / 'mark'}}}\n")
     process = subprocess.Popen(
@@ -89,6 +90,9 @@ def test_an_interrupt_says_what_is_kept_and_the_next_run_takes_it(site: Site, tm
     assert f"interrupted in segment: waiting; kept in {kept}: part, scan, align;" in text
     assert text.splitlines()[-1].startswith("interrupted")
     assert [path.name for path in (tmp_path / "out").iterdir()] == ["job"], "nothing hidden"
+    assert {path.name.partition("-")[0] for path in kept.iterdir()} >= {"part", "scan", "align"}
+    if not is_run_again:
+        return
     (tmp_path / "mark").touch()
     again = CliRunner().invoke(app, ["run", str(job)])
     assert "waited enough" in again.stderr
