@@ -12,7 +12,7 @@ from damageest.errors import StageError
 from damageest.isolation import Limits, end_workers
 from damageest.result import Result
 from tests import damaged_box
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.registry.test_registry import GROWN, Site, site
 
 __all__ = ["site"]

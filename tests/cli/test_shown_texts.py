@@ -12,7 +12,7 @@ import pytest
 from damageest.artefacts import Reason
 from damageest.cli._run_table import print_table
 from damageest.result import Result
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.cli.test_watched_stages import FAULTY, write_job
 from tests.registry.test_registry import Site, site
 

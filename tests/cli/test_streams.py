@@ -18,7 +18,7 @@ import pytest
 import damageest
 from damageest.cli import _streams
 from damageest.errors import InputError
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.cli.test_watched_stages import FAULTY, environment, write_job
 from tests.needs import needs_plugin
 from tests.registry.test_registry import Site, site

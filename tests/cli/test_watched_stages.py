@@ -16,7 +16,7 @@ import pytest
 
 import damageest
 from tests import damaged_box
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.needs import needs_terminal
 from tests.registry.test_registry import Site, site
 
