@@ -120,6 +120,7 @@ import sys
 from damageest.cli import main
 
 if __name__ == "__main__":
+    open(__file__ + ".started", "w").close()
     main()
 """
 
@@ -216,11 +217,12 @@ def test_a_killed_batch_goes_on(tmp_path: Path) -> None:
     assert not (tmp_path / "b" / NEW_ROWS).exists()
 
 
-@pytest.mark.parametrize("seconds", [0.6, 1.2, pytest.param(2.0, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("seconds", [0.2, 0.8, pytest.param(1.6, marks=pytest.mark.slow)])
 def test_ctrl_c_while_workers_start_gives_one_line(seconds: float, tmp_path: Path) -> None:
     """Workers of a cluster that got the signal of the terminal too would print tracebacks."""
     write_night(tmp_path, 2)
     with start(tmp_path, "--workers", "2") as batch:
+        wait_for(tmp_path, "batch.py.started", ".")  # before, Python itself ends, with a traceback
         time.sleep(seconds)
         os.killpg(batch.pid, signal.SIGINT)
         _, err = batch.communicate(timeout=60)

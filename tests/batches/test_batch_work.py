@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from damageest.batches.page import write_page
+from damageest.batches.page import keep_picture, write_page
 from damageest.batches.rows import Row, read_row
 from damageest.batches.work import run_job, work
 from damageest.io.files import embed_png
@@ -63,19 +63,27 @@ def _end() -> Iterator[None]:
     end_workers()
 
 
-def test_the_page_shows_the_picture_of_the_report(small_done: Path, tmp_path: Path) -> None:
-    """It comes from the report as a value, whatever its page looks like; a run without a report has none."""
+def write_page_of(job: Path, *settings: str) -> Path:
+    """Runs the job in this process, and writes the page of a batch with it alone; gives the page's folder."""
+    folder = job.parent / "out"
+    task = make_task(job, *settings) | {"output": str(folder / "job")}
+    row = read_row({name: task[name] for name in ("name", "job", "settings", "output")} | run_job(task))
+    write_page([row], folder)
+    return folder
+
+
+def test_the_page_shows_the_picture_of_the_report(small_done: Path) -> None:
+    """It comes from the report as a value, whatever its page looks like."""
     from PIL import Image
 
-    def run_here(*settings: str) -> Row:
-        task = make_task(small_done, *settings) | {"output": str(tmp_path / "out/job")}
-        return read_row({name: task[name] for name in ("name", "job", "settings", "output")} | run_job(task))
+    folder = write_page_of(small_done, "report=html")
+    assert Image.open(folder / ".job.png").size == (320, 240)
+    assert embed_png((folder / ".job.png").read_bytes()) in (folder / "batch.html").read_text()
 
-    write_page([run_here("report=html")], tmp_path / "out")
-    assert Image.open(tmp_path / "out/.job.png").size == (320, 240)
-    assert embed_png((tmp_path / "out/.job.png").read_bytes()) in (tmp_path / "out/batch.html").read_text()
-    write_page([run_here("report=none")], tmp_path / "out")
-    assert "data:image" not in (tmp_path / "out/batch.html").read_text()
+
+def test_a_run_without_a_report_has_no_picture(small_done: Path) -> None:
+    keep_picture(small_done.parent / "out/job", b"\x89PNG")  # of an earlier run
+    assert "data:image" not in (write_page_of(small_done, "report=none") / "batch.html").read_text()
 
 
 def test_a_stage_that_ends_the_process_is_named(site: Site, tmp_path: Path) -> None:
@@ -83,7 +91,7 @@ def test_a_stage_that_ends_the_process_is_named(site: Site, tmp_path: Path) -> N
     site.add("acme-bad", FAULTY)
     body, text = FAULTS["exits"]
     row = run_one(damaged_box.write_least(tmp_path), f"part={{use: faulty, fault: '{body}'}}")
-    assert row.outcome == "crashed"
+    assert row.outcome == "crashed", row.error
     assert row.error.startswith(f"part: faulty: {text}")
 
 
@@ -93,7 +101,7 @@ def test_a_stage_of_a_site_that_ends_the_process_is_named(name: str, site: Site,
     body, text = FAULTS[name]
     site.add("acme-bad", GROWN.replace(BODY, body))
     row = run_one(damaged_box.write_small(tmp_path, "allowance: doubled\n"))
-    assert row.outcome == "crashed"
+    assert row.outcome == "crashed", row.error
     assert row.error.startswith("allowance: doubled (site 1): ")
     assert text in row.error
 
@@ -103,7 +111,7 @@ def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     job = damaged_box.write_least(tmp_path)
     assert run_one(job, "part=none").outcome == "refused"  # the process has started, and is used again
     row = run_one(job, HANGING, timeout=2)
-    assert row.outcome == "timeout"
+    assert row.outcome == "timeout", row.error
     assert row.error == "part: faulty: was ended: not finished after 2 s, the time limit of a job"
 
 
@@ -111,5 +119,5 @@ def test_a_stage_of_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> Non
     """It has no process of its own."""
     site.add("acme-bad", FAULTY)
     row = run_one(damaged_box.write_least(tmp_path), HANGING, stage_timeout=0.5)
-    assert row.outcome == "timeout"
+    assert row.outcome == "timeout", row.error
     assert row.error == "part: faulty: was ended: not finished after 0.5 s, the time limit of a stage"

@@ -30,11 +30,11 @@ class Ran:
 
 @pytest.fixture(scope="session")
 def command_run(test_run: Path) -> Ran:
-    """``damageest run job.yaml`` in a process of its own, on the small damaged box with stock to mill off."""
+    """``damageest run job.yaml`` in a process of its own, on the least damaged box with stock to mill off."""
 
     def make(folder: Path) -> None:
         stock = "allowance: {use: milling, outer: 1, inner: 0.5}\n"
-        damaged_box.write_small(folder, stock)
+        damaged_box.write_least(folder, stock)
         command = [sys.executable, "-c", "from damageest.cli import main; main()", "run", "job.yaml"]
         begin = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True, cwd=folder, check=False)

@@ -12,7 +12,7 @@ from damageest.errors import StageError
 from damageest.isolation import Limits, end_workers
 from damageest.result import Result
 from tests import damaged_box
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.registry.test_registry import GROWN, Site, site
 
 __all__ = ["site"]
@@ -106,26 +106,25 @@ def test_sys_exit_in_a_stage_without_a_process_of_its_own(site: Site, small_done
     assert "acme-bad 1.2" in " ".join(result.failures)
 
 
-def test_method_auto_goes_on_after_a_crash(
-    site: Site, least_done: Path, tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    """The site that is lost to the crash is found by the other method. What a worker prints goes to the error
-    stream."""
+@pytest.mark.slow
+def test_method_auto_goes_on_after_a_crash(site: Site, small_done: Path, tmp_path: Path) -> None:
+    """The site that is lost to the crash is found by the other method."""
     site.add("acme-once", ONCE)
-    result = damageest.run(least_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
+    result = damageest.run(small_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
     assert (tmp_path / "crashed").exists()
     assert result.status == "ok"
     assert [item.method for item in result.sites] == ["surface"]
     assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
-    out, err = capfd.readouterr()
-    assert "hello" in err
-    assert "hello" not in out
 
 
 def test_the_same_result_as_without_isolation(
-    site: Site, small_done: Path, small_result: Result, tmp_path: Path
+    site: Site, small_done: Path, small_result: Result, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
+    """What a worker prints goes to the error stream."""
     site.add("acme-once", ONCE)
     (tmp_path / "crashed").touch()
     isolated = damageest.run(small_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
     assert isolated.sites[0].damage.vertices.tobytes() == small_result.sites[0].damage.vertices.tobytes()
+    out, err = capfd.readouterr()
+    assert "hello" in err
+    assert "hello" not in out

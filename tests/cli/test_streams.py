@@ -1,5 +1,5 @@
-"""What the command line prints: texts of others are shown as they are, results for programs stay clean, and a stream
-that is closed, full or of another encoding ends no run."""
+"""What the command line prints: results for programs stay clean, and a stream that is closed, full or of another
+encoding ends no run."""
 
 from __future__ import annotations
 
@@ -10,19 +10,15 @@ import os
 import shutil
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import damageest
-from damageest.artefacts import Reason
 from damageest.cli import _streams
-from damageest.cli._run_table import print_table
 from damageest.errors import InputError
-from damageest.result import Result
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.cli.test_watched_stages import FAULTY, environment, write_job
 from tests.needs import needs_plugin
 from tests.registry.test_registry import Site, site
@@ -228,64 +224,6 @@ def test_json_of_other_commands_is_alone_too(command: str, site: Site, ready: Pa
     assert json.loads(ran.stdout), ran.stderr
     if "--json" in command:
         assert len(find_printed(ran.stderr)) == 4
-
-
-HARMFUL = "[/red] [bold]x :bomb: \x1b[31mred\x1b]0;title\x07 \x9b2J ‮back"
-SHOWN = r"[/red] [bold]x :bomb: \x1b[31mred\x1b]0;title\x07 \x9b2J \u202eback"
-
-
-@pytest.mark.parametrize("way", ["error", "library"])
-def test_texts_of_plugins_are_shown_as_they_are(way: str, site: Site, ready: Path) -> None:
-    site.add("acme-bad", FAULTY)
-    raised = {
-        "error": f"from damageest.errors import StageError; raise StageError({HARMFUL!r} + 'x' * 50_000_000)",
-        "library": f"raise ValueError({HARMFUL!r} + 'x' * 50_000_000)",
-    }
-    status, said = call("run", write_job(ready, "harmful", raised[way]))
-    assert status == 1
-    assert SHOWN in said, said[:2000]
-    assert not [one for one in said if one in "\x1b\x07\x9b\u202e"]
-    assert len(said) < 100_000
-
-
-def test_notes_and_failures_are_shown_as_they_are(
-    tmp_path: Path, small_result: Result, capsys: pytest.CaptureFixture[str]
-) -> None:
-    notes = (Reason("x", HARMFUL), Reason("y", "x" * 50_000_000))
-    told = replace(small_result, warnings=notes, failures=(HARMFUL,))
-    print_table(told, tmp_path / "final [v2]")
-    said = capsys.readouterr().out
-    assert f"note: {SHOWN}" in said
-    assert f"failed: {SHOWN}" in said
-    assert len(said) < 20_000
-
-
-ODD = ("[red]a\tb\x1b[1m", "final [v2]", ":bomb:")
-"""Names of folders that are words of a markup too."""
-
-
-def show_path(path: Path) -> str:
-    return f"written to {path}".replace("\t", " ").replace("\x1b", r"\x1b")
-
-
-def test_the_printed_path_is_shown_as_it_is(
-    tmp_path: Path, small_result: Result, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for output in ODD:
-        print_table(small_result, tmp_path / output)
-        assert capsys.readouterr().out.splitlines()[-1] == show_path(tmp_path / output)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("output", ODD)
-def test_the_printed_path_is_that_of_the_folder(output: str, ready: Path) -> None:
-    ran = subprocess.run(
-        [sys.executable, "-c", "from damageest.cli import main; main()", "run", "job.yaml", "-o", output],
-        cwd=ready, capture_output=True, text=True, timeout=100,
-    )  # fmt: skip
-    assert ran.returncode == 0, ran.stderr
-    assert (ready / output / "result.json").is_file()
-    assert ran.stdout.splitlines()[-1] == show_path((ready / output).resolve())
 
 
 def test_a_file_name_that_is_no_text_is_shown(ready: Path) -> None:

@@ -13,7 +13,7 @@ from damageest.cli._run_table import MOST_SURPLUS, list_surplus
 from damageest.findings import Surplus
 from damageest.io.meshes import write_points
 from damageest.output.result_json import result_schema
-from tests.cli.test_first_day import call
+from tests.cli.calls import call
 from tests.needs import import_or_skip
 from tests.surplus_scenes import block, scan, slab, table
 

@@ -154,11 +154,18 @@ def find_red(image: np.ndarray) -> np.ndarray:
     return (image[..., 0] > image[..., 1] + 40) & (image[..., 0] > image[..., 2] + 20)
 
 
-def test_a_picture_shows_the_damage(folder: Path, tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def image(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> np.ndarray:
     picture = pictures.Picture((open_output(folder),), (1,), ("damage",), "z", (160, 120))
-    image = draw(picture, tmp_path / "new/picture.png")
+    return draw(picture, tmp_path_factory.mktemp("picture") / "new/picture.png")
+
+
+def test_a_picture_has_its_size_and_shows_the_part(image: np.ndarray) -> None:
     assert image.shape == (120, 160, 3)
     assert (image.min(axis=2) < 240).mean() > 0.05
+
+
+def test_a_picture_shows_the_damage(image: np.ndarray) -> None:
     assert find_red(image).sum() > 20
 
 

@@ -86,10 +86,18 @@ def test_isolated_calls_give_values_and_their_faults_are_errors(tmp_path: Path) 
 COMMAND = "import sys; from damageest.cli import main; sys.argv[0] = 'damageest'; main()"
 
 
-def test_a_job_runs(tmp_path: Path) -> None:
-    done = run(tmp_path, COMMAND, "run", str(damaged_box.write_least(tmp_path)), "--json", "--memory", "4GB")
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert json.loads(done.stdout)["damage_volume"] == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory: pytest.TempPathFactory) -> subprocess.CompletedProcess[str]:
+    folder = tmp_path_factory.mktemp("portable")
+    return run(folder, COMMAND, "run", str(damaged_box.write_least(folder)), "--json", "--memory", "4GB")
+
+
+def test_a_job_runs(ran: subprocess.CompletedProcess[str]) -> None:
+    assert ran.returncode == 0, ran.stdout + ran.stderr
+
+
+def test_its_volume_is_right(ran: subprocess.CompletedProcess[str]) -> None:
+    assert json.loads(ran.stdout)["damage_volume"] == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
 
 
 @pytest.mark.slow
