@@ -28,7 +28,7 @@ def make(body: Manifold) -> Part:
 
 
 def run(whole: Manifold, left: Manifold, known: bool = True, views: list[list[int]] = VIEWS) -> Result:
-    scanner = Simulate.model_validate({"points": 20_000, "noise": NOISE, "scanners": views, "positions_known": known})
+    scanner = Simulate.model_validate({"points": 14_000, "noise": NOISE, "scanners": views, "positions_known": known})
     scan = scanner.run("mm", make(left))
     return damageest.run({"version": 1, "tolerance": TOLERANCE, "align": "none"}, part=make(whole), scan=scan)
 

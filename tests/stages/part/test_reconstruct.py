@@ -92,7 +92,7 @@ def test_too_few_points_and_too_fine_a_cell_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_job_without_cad_finds_the_damage(tmp_path: Path) -> None:
-    specimen(tmp_path, 12_000)
+    specimen(tmp_path, 8000)
     np.save(tmp_path / "scan.npy", scan(6000))
     part = {"use": "reconstruct", "path": str(tmp_path / "specimen.npy")}
     job = {"version": 1, "tolerance": 0.4, "align": "none", "part": part, "scan": str(tmp_path / "scan.npy")}
