@@ -26,7 +26,7 @@ def make_signs(kind: str, count: int) -> Floats:
 @pytest.fixture(scope="module")
 def outward() -> tuple[Part, Scan]:
     """A scan of a block with normals, in the order of its points along the part."""
-    part, scan = scene("block", seed=3, missing=0.05, points=5000)
+    part, scan = scene("block", seed=3, missing=0.05, points=3000)
     assert scan.truth is not None
     T = scan.truth.T_part_scan
     aligned = scan.move(T)
