@@ -21,7 +21,7 @@ CASES = [pytest.param(0.15, 0.0, marks=pytest.mark.slow), (0.2, NOISE)]
 
 @lru_cache
 def lost(tolerance: float, noise: float) -> Result:
-    return run(scan(block() - pocket(DEPTH), noise), tolerance)
+    return run(scan(block() - pocket(DEPTH), noise), tolerance, adapt="none", allowance="none")
 
 
 @pytest.mark.parametrize(("tolerance", "noise"), CASES)
@@ -45,7 +45,7 @@ def test_no_depth_is_beyond_the_deepest_point(tolerance: float, noise: float) ->
 
 def test_shallow_added_metal_holds_little_that_is_not_there(registry: Registry) -> None:
     points = Scan(scan(block() + pad(DEPTH)))
-    found = run_until("fit_model", as_part(block()), points, registry, tolerance=0.2, align="none")
+    found = run_until("fit_model", as_part(block()), points, registry, tolerance=0.15, align="none", adapt="none")
     (item,) = found.state.surplus
     truth = to_manifold(as_solid(pad(DEPTH)))
     assert item.solid is not None
