@@ -55,7 +55,7 @@ def test_noise_below_the_tolerance_that_alone_makes_very_many_places_is_refused(
         run_until("look_for_sheets", part, scan, registry, tolerance=0.25, align=align)
 
 
-@pytest.mark.parametrize("deeper", [0, 300], ids=["noise alone", "and damage"])
+@pytest.mark.parametrize("deeper", [0, 400], ids=["noise alone", "and damage"])
 def test_very_many_clusters_are_refused_only_where_noise_makes_them(deeper: int) -> None:
     """Each of five points; ``deeper``: so many of them are below the reach of the noise."""
     tolerance, part = 0.25, PARTS["lever"]()
