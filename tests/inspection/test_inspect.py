@@ -27,7 +27,7 @@ JOB = (
     damaged_box.JOB.replace("tolerance: 0.2", "tolerance: 0.4")
     + "allowance: {use: milling, outer: 1.0, overlap: 0.5}\n"
 )
-SPACING, COARSE = 0.4, 0.7
+SPACING, COARSE = 0.4, 1.0
 BUMP = Manifold.sphere(2.0, 48).translate((3, 2, 11.2))
 """Too much on the deposit, whose top is 11 mm high."""
 SHORT = Manifold.cylinder(3, 1.2, 1.2, 48).translate((-3, -1, 10.3))

@@ -63,7 +63,7 @@ def test_an_undamaged_part_has_lost_nothing() -> None:
 def worn_plate(amplitude: float, noise: float) -> tuple[Floats, float]:
     """A scan of the box with a worn hollow on top that fades out to all sides, and the volume lost."""
     width = 5.0
-    points = np.array(Simulate.model_validate({"points": 8000, "noise": 0}).run("mm", damaged_box.box()).points)
+    points = np.array(Simulate.model_validate({"points": 5000, "noise": 0}).run("mm", damaged_box.box()).points)
     top = points[:, 2] > damaged_box.SIZE[2] / 2 - 1e-9
     points[top, 2] -= amplitude * np.exp(-(points[top, :2] ** 2).sum(axis=1) / (2 * width**2))
     points += np.random.default_rng(0).normal(scale=noise, size=points.shape)

@@ -25,7 +25,7 @@ WORN = Blade(chord=39.4, thickness=4.6, twist=(10.4, 31.0), bow=0.3)
 
 @cache
 def design() -> Part:
-    return DESIGN.part()
+    return DESIGN.part(rings=31)
 
 
 @cache
