@@ -131,7 +131,7 @@ def test_two_pieces_broken_out_of_a_frame_and_a_dent_beside() -> None:
 
 def test_one_end_of_a_missing_piece_unseen_is_refused_and_named() -> None:
     part, scan, tolerance = scanned(
-        ring(), {"tool": "box", "centre": [30, 0, 0], "size": [30, 25, 30]}, points=9000, noise=0.001
+        ring(), {"tool": "box", "centre": [30, 0, 0], "size": [30, 25, 30]}, points=6000, noise=0.001
     )
     seen = scan.points[~((np.abs(scan.points[:, 1] - 12.5) < 3) & (scan.points[:, 0] > 0))]
     with pytest.raises(StageError, match=r"enclose: adaptive \(\d+ points near \("):
