@@ -16,7 +16,7 @@ from damageest.pipeline.routes import route_of
 from damageest.registry import Registry
 from tests.faults import others, seeds
 from tests.faults.mutations import KINDS, fix_pages, spoil
-from tests.faults.run import GOOD, NAMES, Case, Row, Worker, find_seed, fuzz, make_cases, write_case
+from tests.faults.run import GOOD, NAMES, Case, Row, Worker, find_seed, fuzz, make_cases, make_earlier, write_case
 from tests.needs import find_obstacle
 
 HERE = [name for name in NAMES if not (name.endswith(seeds.NATIVE) and find_obstacle("cadquery"))]
@@ -28,9 +28,10 @@ def describe_bad(rows: list[Row]) -> list[Row]:
 
 
 @pytest.fixture(scope="module")
-def worker() -> Iterator[Worker]:
+def worker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker]:
     one = Worker()
-    one.start()
+    seeds.write_others(folder := tmp_path_factory.mktemp("first"))
+    make_earlier(folder, one)  # the first run loads what all need
     yield one
     one.stop()
 

@@ -70,6 +70,7 @@ def worn_plate(amplitude: float, noise: float) -> tuple[Floats, float]:
     return points, amplitude * 2 * np.pi * width**2 * 0.99  # the rest is beyond the edge of the box
 
 
+@pytest.mark.slow
 def test_wear_says_how_it_fades_out_and_the_interval_holds_what_it_leaves_out() -> None:
     points, volume = worn_plate(amplitude=0.5, noise=0.04)
     job = {"version": 1, "tolerance": 0.2}
