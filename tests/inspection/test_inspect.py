@@ -27,7 +27,7 @@ JOB = (
     damaged_box.JOB.replace("tolerance: 0.2", "tolerance: 0.4")
     + "allowance: {use: milling, outer: 1.0, overlap: 0.5}\n"
 )
-SPACING, COARSE = 0.4, 0.7
+SPACING, COARSE = 0.4, 1.0
 BUMP = Manifold.sphere(2.0, 48).translate((3, 2, 11.2))
 """Too much on the deposit, whose top is 11 mm high."""
 SHORT = Manifold.cylinder(3, 1.2, 1.2, 48).translate((-3, -1, 10.3))
@@ -117,7 +117,7 @@ def test_a_good_part_after_milling_is_met_and_appended(repair: Repair) -> None:
 
 
 def test_a_repair_that_the_scan_does_not_show_is_not_met(repair: Repair) -> None:
-    points = scan_mesh(repair.aim.nominal, COARSE, 0.03)
+    points = scan_mesh(repair.aim.nominal, 0.7, 0.03)
     hidden = (points[:, 2] > 9) & (points[:, 0] > 1) & (points[:, 0] < 9) & (abs(points[:, 1]) < 9)
     trimesh.PointCloud(points[~hidden]).export(repair.folder / "partly.ply")
     done = inspect(repair.folder, "partly.ply", "milled")

@@ -16,7 +16,7 @@ from damageest.result import Result
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
-LATE = ("choice", "accept", "scanner", "temperature", "asked_sections")
+LATE = ("choice", "accept", "scanner", "temperature", "asked_sections", "encloser")
 """What the job says of the rest of the route."""
 
 

@@ -10,10 +10,12 @@ import pytest
 import trimesh
 
 import damageest
-from damageest.artefacts import Floats, Part, Pose, Scan
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Scan
+from damageest.pipeline.datums import note_datums
 from damageest.pipeline.state import JobState
 from damageest.registry import Registry
 from damageest.result import Result
+from damageest.stages.align.icp import Icp
 from tests.pipeline.halfway import run_until
 
 SIZE, NOISE, TOLERANCE = np.array([60.0, 30.0, 20.0]), 0.04, 0.16
@@ -83,12 +85,27 @@ def draw_bent() -> Floats:
 LIST = [one for items in DATUMS.values() for one in items]
 
 
-@pytest.mark.parametrize("datum", [DATUMS, pytest.param(LIST, marks=pytest.mark.slow)], ids=["system", "list"])
+@pytest.mark.slow
+@pytest.mark.parametrize("datum", [DATUMS, LIST], ids=["system", "list"])
 def test_an_adapted_part_that_moves_the_pose_off_its_datums_is_named(datum: Any, registry: Registry) -> None:
     moved = run_until_adapted(draw_bent(), registry, datum, "smooth")
     (note,) = [note for note in moved.warnings if note.code == "datum_moved"]
     assert note.amount is not None
     assert note.amount >= measure_off(moved.pose) > TOLERANCE / 4
+
+
+@pytest.mark.parametrize(("shift", "is_told"), [(0.02, True), (0.01, False)])
+def test_an_adapted_part_that_takes_the_datums_along_is_told(shift: float, is_told: bool) -> None:
+    """Where it moves them by more than a tenth of the tolerance, 0.16, and the job names datums."""
+    part, motion = make_part(), np.eye(4)
+    motion[2, 3] = shift
+    rest = np.zeros(part.vertices.shape)
+    adapted = AdaptedPart(part, rest, motion, np.zeros((2, *rest.shape)), 0.3, 0.1, 0.01, 0.01, (4, 3, 2))
+    for datum in (DATUMS, LIST, None):
+        aligner = Icp.model_validate({"datum": datum} if datum else {})
+        notes = note_datums.function(adapted, aligner, part, TOLERANCE, "mm")
+        assert [note.code for note in notes] == ["datum_moved"] * (is_told and datum is not None)
+        assert all(note.amount == pytest.approx(shift) for note in notes)
 
 
 @pytest.mark.parametrize("datum", [DATUMS, LIST], ids=["system", "list"])

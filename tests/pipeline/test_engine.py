@@ -171,7 +171,10 @@ def test_only_what_changed_runs_again(small_done: Path, small_result: Result, re
     # `path: none` takes nothing, so nothing has changed for it
     assert {record.stage for record in again.stages if record.cached} == {"part", "path"}
     assert again.scan.points.shape == (2000, 3)
-    nearby = damageest.run(path, output=True, registry=registry, settings=["cluster.neighbours=11"])
+
+
+def test_other_options_of_a_stage_run_it_again_and_nothing_before(small_done: Path, registry: Registry) -> None:
+    nearby = damageest.run(small_done, output=True, registry=registry, settings=["cluster.neighbours=11"])
     cached = {record.stage for record in nearby.stages if record.cached}
     assert {"part", "scan", "align", "segment"} <= cached
     assert "cluster" not in cached

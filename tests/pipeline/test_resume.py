@@ -30,10 +30,10 @@ class Killer:
         if stage == sys.argv[2]:
             os.kill(os.getpid(), signal.SIGKILL)
 
-damageest.run(sys.argv[1], output=True, registry=Registry.discover([Killer()]), settings=["cluster.neighbours=9"])
+damageest.run(sys.argv[1], output=True, registry=Registry.discover([Killer()]), settings=["cluster.neighbours=9", "tolerance=0.6"])
 """
 ROUTE = ["part", "scan", "align", "segment", "cluster", "enclose", "boolean", "allowance", "export", "report"]
-SETTINGS = ["cluster.neighbours=9"]
+SETTINGS = ["cluster.neighbours=9", "tolerance=0.6"]
 
 
 @pytest.mark.slow
