@@ -9,7 +9,7 @@ import pytest
 from damageest_paths.clearance import Clearance
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.obstacles import Obstacles
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.artefacts import Floats, Mesh
@@ -50,6 +50,7 @@ def measure(clearance: Clearance, triangles: Floats, point: Floats, axis: Floats
 
 
 @pytest.mark.parametrize("cone", CONES.values(), ids=CONES)
+@settings(deadline=None)  # the first call compiles
 @given(seed=st.integers(0, 10**6), needed=st.floats(0.05, 3.0))
 def test_the_true_distance_lies_between_the_bounds_for_each_shape(cone: Cone, seed: int, needed: float) -> None:
     """By FCL, among random triangles, large and small. A short nozzle has some of them behind it."""
