@@ -30,7 +30,7 @@ class Killer:
         if stage == sys.argv[2]:
             os.kill(os.getpid(), signal.SIGKILL)
 
-damageest.run(sys.argv[1], output=True, registry=Registry.discover([Killer()]), settings=["cluster.neighbours=9", "tolerance=0.6"])
+damageest.run(sys.argv[1], output=True, registry=Registry.discover([Killer()]), settings=sys.argv[3:])
 """
 ROUTE = ["part", "scan", "align", "segment", "cluster", "enclose", "boolean", "allowance", "export", "report"]
 SETTINGS = ["cluster.neighbours=9", "tolerance=0.6"]
@@ -39,7 +39,7 @@ SETTINGS = ["cluster.neighbours=9", "tolerance=0.6"]
 @pytest.mark.slow
 @pytest.mark.parametrize("stage", ROUTE)
 def test_killed_in(stage: str, small_done: Path, registry: Registry) -> None:
-    command = [sys.executable, "-c", DRIVER, str(small_done), stage]
+    command = [sys.executable, "-c", DRIVER, str(small_done), stage, *SETTINGS]
     check_killed(
         small_done, ROUTE.index(stage), registry, lambda: subprocess.run(command, capture_output=True).returncode
     )

@@ -56,7 +56,7 @@ def test_a_loss_under_a_bead_is_right_where_it_is_seen_and_named() -> None:
 def test_a_bead_is_right_and_no_loss(registry: Registry) -> None:
     actual = block() + slab((8, 10, 2), 3, 0, 6)
     points = Scan(scan(actual, 12_000))
-    job = {"tolerance": 0.2, "align": "none", "method": "implicit"}
+    job = {"tolerance": 0.2, "align": "none", "adapt": "none", "method": "implicit"}
     state = run_until("fit_model", part(), points, registry, **job).state
     assert state.sites.count == 0
     (bead,) = state.surplus
