@@ -42,7 +42,7 @@ def limit_files(kilobytes: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
-@pytest.mark.parametrize("kilobytes", [0, 8, pytest.param(100, marks=SLOW), pytest.param(300, marks=SLOW)])
+@pytest.mark.parametrize("kilobytes", [0, 8, pytest.param(100, marks=SLOW), pytest.param(140, marks=SLOW)])
 def test_a_full_disk(kilobytes: int, small_done: Path) -> None:
     out = small_done.parent / "out"
     before = damaged_box.content(out / "job")
