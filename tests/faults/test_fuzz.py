@@ -57,7 +57,7 @@ def check_spoiled(count: int, whole: float, worker: Worker) -> None:
 
 
 def test_spoiled_files_are_refused_or_read(worker: Worker) -> None:
-    check_spoiled(50, 0.06, worker)
+    check_spoiled(len(QUICK), 0.06, worker)
 
 
 @pytest.mark.slow

@@ -114,7 +114,7 @@ ODD = ["a\nb", "ñ 零件 قطعة", "'\"$(x)`;&| %s{}*?[a]", "a b", "-rf", "…
 def test_odd_names(name: str, tmp_path: Path) -> None:
     """Of the folder, the files, the job and the output."""
     folder = tmp_path / name
-    damaged_box.write(folder, points=2000)
+    damaged_box.write(folder, points=1200)
     (folder / "box.stl").rename(folder / f"{name}.stl")
     (folder / "scan.ply").rename(folder / f"{name}.ply")
     job = {"version": 1, "name": name, "tolerance": 0.6, "align": "none", "report": "none"}
