@@ -215,7 +215,9 @@ def test_a_format_of_a_plugin_that_is_not_there_names_it(job_file: Any, registry
     from dataclasses import replace
 
     own = replace(registry, writers={name: w for name, w in registry.writers.items() if name != "step"})
-    with pytest.raises(JobError, match=r"'step' needs the plugin damageest-cadquery.*(pip|apt-get) install"):
+    with pytest.raises(
+        JobError, match=r"'step' needs the plugin damageest-cadquery.*(pip install|uv sync|apt-get install)"
+    ):
         load(job_file("export: {format: [stl, step]}\n"), own)
     with pytest.raises(JobError, match="a spline needs the plugin damageest-cadquery"):
         load(job_file("export: {spline: true}\n"), own)
