@@ -4,7 +4,7 @@
 #   docker run --rm --user "$(id -u):$(id -g)" -v "$PWD:/data" damageest run /data/job.yaml
 # BASE names a version of Debian, not its content, since the digest of an image can only be asked of a registry. To build from
 # the same content each time: --build-arg BASE=debian@sha256:...
-# `.ci/bare-debian image core` runs these steps in a bare Debian without a container engine.
+# Hosted CI builds both and runs the example job in each (.github/workflows/ci.yml); nothing else does.
 ARG BASE=debian:trixie-slim
 
 FROM ${BASE} AS base

@@ -17,7 +17,7 @@ from damageest.result import Result
 from tests import damaged_box
 from tests.kept import keep
 
-pytest_plugins = ["tests.costs"]
+pytest_plugins = ["tests.costs", "tests.lacking"]
 
 
 @pytest.fixture(scope="session")

@@ -125,7 +125,7 @@ EXIT_STATUSES: dict[int, str] = {
     0: "done; for `run` also where no damage was found, and where an extra for the report is not installed",
     1: "a stage failed or refused, no site is accepted, a site has no volume, a job of a batch is not `ok`, a "
     "tolerance is not met (`inspect`), or `verify` or `doctor` found a fault",
-    2: "the command, the job or an input is not valid; nothing was written for that job",
+    2: "the command, the job or an input is not valid; no result was written for that job",
     130: "ended by Ctrl-C",
     141: "who read the output closed it, as `head` does",
 }

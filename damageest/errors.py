@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import difflib
 import errno
+import os
 import re
+import shutil
+import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 MOST_TEXT = 2000
 """Characters of a message from a plugin or a library that are shown; the rest is cut."""
@@ -142,6 +146,40 @@ def suggest(name: str, valid: Sequence[str]) -> str:
     return f" (did you mean '{close[0]}'?)" if close else ""
 
 
+def describe_install(name: str, root: Path | None = None) -> str:
+    """The command that adds a package of this project, as ``damageest-paths``, or an extra, as ``pdf``, to what is
+    installed: uv's where damageest runs in the environment of a clone, else pip's. ``root``: of the clone, by default
+    the folder above the package."""
+    root = root or Path(__file__).resolve().parents[1]
+    is_package = name.startswith("damageest-")
+    if not (root / "plugins").is_dir():
+        return f"pip install {name}" if is_package else f'pip install "damageest[{name}]"'
+    if not _is_environment_of(root):
+        return f'pip install -e "{root / "plugins" / name[10:] if is_package else f"{root}[{name}]"}"'
+    at = "" if Path.cwd() == root else f" --project {root}"
+    return f"{_find_uv(root)} sync --inexact --no-dev{at} {'--package' if is_package else '--extra'} {name}"
+
+
+def describe_pip_install(name: str, root: Path | None = None) -> str:
+    """The same for a package of others: an environment that uv made has no pip."""
+    root = root or Path(__file__).resolve().parents[1]
+    is_ours = (root / "plugins").is_dir() and _is_environment_of(root)
+    return f"{_find_uv(root)} pip install {name}" if is_ours else f"pip install {name}"
+
+
+def _is_environment_of(root: Path) -> bool:
+    named = os.environ.get("UV_PROJECT_ENVIRONMENT", ".venv")
+    return Path(sys.prefix).resolve() == (root / named).resolve()
+
+
+def _find_uv(root: Path) -> str:
+    """uv as it can be typed here: the README puts it into the clone, and not on the path."""
+    own = root / ".uv/bin/uv"
+    if shutil.which("uv") or not own.is_file():
+        return "uv"
+    return ".uv/bin/uv" if Path.cwd() == root else str(own)
+
+
 def is_interrupt(error: BaseException) -> bool:
     """Whether an error comes from an interrupt (Ctrl-C). A compiled module that is interrupted while it is imported
     raises ImportError with the interrupt as its cause."""
@@ -191,12 +229,12 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         module = error.name.partition(".")[0]
         if module not in EXTRAS:
             return StageError(
-                f"the Python module {error.name} is not installed", f"pip install {module}", code="missing"
+                f"the Python module {error.name} is not installed", describe_pip_install(module), code="missing"
             )
         extra = EXTRAS[module]
         missing = StageError(
             f"the Python module {error.name} is not installed; the extra '{extra}' brings it",
-            f'pip install "damageest[{extra}]"',
+            describe_install(extra),
             code="missing",
         )
         missing.extra = extra

@@ -186,6 +186,16 @@ def describe_interval(interval: Interval | None) -> str:
     return f"{low:.4g} to {high:.4g}" if math.isfinite(high) else f"at least {low:.4g}"
 
 
+def describe_volume(volume: float, interval: Interval | None) -> str:
+    """A volume with the digits that its interval bears: two of half its width, but three to six of the volume. What
+    differs between versions of libraries is not shown then."""
+    digits = 6
+    if interval is not None and math.isfinite(interval[1]) and interval[1] > interval[0] and volume > 0:
+        last = math.floor(math.log10((interval[1] - interval[0]) / 2)) - 1
+        digits = min(max(math.floor(math.log10(volume)) - last + 1, 3), 6)
+    return f"{float(f'{volume:.{digits}g}'):.6g}"
+
+
 @dataclass(frozen=True)
 class BudgetRow:
     """One source of a budget of uncertainty, as JCGM 100 has them: ``source``, ``text`` in words; ``type``: A, from the

@@ -1,8 +1,8 @@
 """What a test needs from this machine: where a plugin or a terminal cannot be used, its tests are skipped, with the
 reason.
 
-For a plugin only a system library that is missing counts as a reason. A plugin that is broken in another way fails its
-tests.
+For a plugin a system library or a package that is missing counts as a reason. A plugin that is broken in another way
+fails its tests.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ from __future__ import annotations
 import importlib
 import os
 from functools import cache
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from damageest.errors import PluginError
+from damageest.errors import PluginError, describe_missing_library, find_missing_library
+from tests.optional_imports import list_optional, list_required
 
 PLUGINS = tuple(sorted(path.parent.name for path in (Path(__file__).parents[1] / "plugins").glob("*/pyproject.toml")))
 """The short names of this repository's plugins: their folders."""
@@ -23,14 +25,62 @@ PLUGINS = tuple(sorted(path.parent.name for path in (Path(__file__).parents[1] /
 
 @cache
 def find_obstacle(plugin: str) -> str:
-    """Which system library the plugin lacks here, and what to do; empty where it can be used."""
+    """Which system library or package the plugin lacks here, and what to do; empty where it can be used. Packages are
+    looked for, not imported: that would take seconds."""
+    if missing := next((module for module in list_required(plugin) if find_spec(module) is None), ""):
+        return _say_missing(missing)
     try:
         module = importlib.import_module(f"damageest_{plugin}")
         if hasattr(module, "damageest_stages"):
             module.damageest_stages()
     except PluginError as error:
         return f"{error}; {error.remedy}"
+    except ImportError as error:
+        if said := explain_import_error(error):
+            return said
+        raise
     return ""
+
+
+@cache
+def find_unusable(plugin: str) -> str:
+    """As `find_obstacle`, but imports the packages that the plugin requires: one may be there and not load. Empty where
+    one is broken in another way."""
+    try:
+        if obstacle := find_obstacle(plugin):
+            return obstacle
+        for module in list_required(plugin):
+            importlib.import_module(module)
+    except ImportError as error:
+        said = explain_import_error(error)
+        return f"the plugin {plugin} cannot be used here: {said}" if said else ""
+    return ""
+
+
+def import_or_skip(module: str) -> Any:
+    """A module of a package that few tests need. Skips the test, or the file at whose top it is called, where the
+    package is not there or lacks a system library; `pytest.importorskip` would raise for the second."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        if not (reason := explain_import_error(error)):
+            raise
+    pytest.skip(reason, allow_module_level=True)
+
+
+def explain_import_error(error: ImportError) -> str:
+    """What is missing, and what to install; empty where nothing is: the module is broken, or not there though it is of
+    this repository."""
+    if isinstance(error, ModuleNotFoundError) and error.name and not error.name.startswith(("damageest", "tests")):
+        return _say_missing(error.name.partition(".")[0])
+    if find_missing_library(error) and (described := describe_missing_library(error)):
+        return f"{described.message}; {described.own_remedy}"
+    return ""
+
+
+def _say_missing(module: str) -> str:
+    package = next((name for name, modules in list_optional().items() if module in modules), module)
+    return f"the Python module {module} is not installed; pip install {package}"
 
 
 def needs_plugin(*plugins: str) -> pytest.MarkDecorator:

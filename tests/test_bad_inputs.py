@@ -16,6 +16,7 @@ from damageest.io.meshes import write_points
 from tests import damaged_box
 
 Spoil = Callable[[Path], None]
+POINTS = 2000
 
 
 def job(text: str, whole: bool = False) -> Spoil:
@@ -28,7 +29,7 @@ def file(name: str, content: bytes) -> Spoil:
 
 def scan(change: Callable[[np.ndarray], np.ndarray], extra: str = "") -> Spoil:
     def spoil(folder: Path) -> None:
-        x, y, z = change(damaged_box.scan()).T
+        x, y, z = change(damaged_box.scan(POINTS)).T
         write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
         (folder / "job.yaml").write_text(damaged_box.JOB.replace("align: none\n", extra))
 
@@ -45,7 +46,7 @@ def without_a_face(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def of_another_part(points: np.ndarray) -> np.ndarray:
-    return np.asarray(trimesh.sample.sample_surface(trimesh.creation.torus(15, 4), 20_000, seed=0)[0])
+    return np.asarray(trimesh.sample.sample_surface(trimesh.creation.torus(15, 4), 2000, seed=0)[0])
 
 
 SIMULATE = "version: 1\npart: box.stl\nscan:\n  use: simulate\n  damage: [{}]\n"
@@ -92,7 +93,8 @@ CASES: dict[str, tuple[Spoil, int, str]] = {
     "scan in metres": (scan(lambda p: p / 1000), 2, "scan.unit: m"),
     "scan in inches": (scan(lambda p: p / 25.4), 2, "scan.unit: in"),
     "part in inches": (part(lambda m: m.apply_scale(1 / 25.4)), 2, "part.unit: in"),
-    "scan of another part": (scan(of_another_part), 1, "align"),
+    "scan of another part": (scan(of_another_part, "align: icp\n"), 1, "align"),
+    "scan of another part anywhere": (scan(of_another_part), 1, "align"),
     "tool that misses": (job(SIMULATE.format("{tool: sphere, centre: [99, 0, 0], radius: 1}"), True), 1, "misses"),
     "tool that takes all": (job(SIMULATE.format("{tool: sphere, centre: [0, 0, 0], radius: 99}"), True), 1, "simulate"),
     "unknown tool": (job(SIMULATE.format("{tool: hammer}"), True), 2, "tool"),
@@ -101,10 +103,12 @@ CASES: dict[str, tuple[Spoil, int, str]] = {
 }
 
 
-@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize(
+    "case", [pytest.param(name, marks=pytest.mark.slow if name.endswith("anywhere") else ()) for name in CASES]
+)
 def test_refused_with_a_reason(case: str, tmp_path: Path) -> None:
     spoil, status, text = CASES[case]
-    path = damaged_box.write(tmp_path)
+    path = damaged_box.write(tmp_path, points=POINTS)
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine/notes.txt").write_text("mine")
     out = tmp_path / "out/job"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import re
 import shlex
 import shutil
@@ -35,7 +36,7 @@ def commands(page: Path) -> list[list[str]]:
     """The words of each `damageest` command in the page's blocks, without `damageest` itself."""
     lines = [line for block in (*blocks(page, "sh"), *blocks(page, "")) for line in block.splitlines()]
     parts = [part.strip() for line in lines for part in line.split("&&")]
-    calls = [re.match(r"(?:\S*uv run (?:--extra \w+ |--\S+ )*)?damageest (.*)", part) for part in parts]
+    calls = [re.match(r"(?:uv run )?damageest (.*)", part) for part in parts]
     return [shlex.split(call[1], comments=True) for call in calls if call]
 
 
@@ -68,6 +69,75 @@ def test_a_command_is_one(page: Path, words: list[str]) -> None:
 def test_a_command_that_is_none_is_seen(line: str, said: str) -> None:
     with pytest.raises(Exception, match=said):
         test_a_command_is_one(PAGES[0], line.split())
+
+
+def load_runner() -> Any:
+    """`.ci/pages.py`, which runs all that the pages show."""
+    spec = importlib.util.spec_from_file_location("pages", ROOT / ".ci/pages.py")
+    assert spec
+    assert spec.loader
+    sys.modules["pages"] = module = importlib.util.module_from_spec(spec)  # dataclasses look there
+    spec.loader.exec_module(module)
+    return module
+
+
+RUNNER = load_runner()
+READ = [(page.name, block) for page in RUNNER.list_pages(ROOT) for block in RUNNER.read_blocks(page)]
+REASONS = {
+    "starts a server": ["app.md: damageest app jobs", "batch.md: dask scheduler --port 8786"],
+    "needs a container engine": ["install.md: docker build --target core -t damageest ."],
+    "needs a file of the reader": ["inspect.md: damageest inspect out/blade after.ply --step deposited"],
+    "takes hours": [
+        "exact-step.md: python -m damageest_cadquery.evaluate",
+        "large.md: /usr/bin/time -v damageest run --no-cache job.yaml",
+        "measurements.md: damageest evaluate",
+        "model-fit.md: damageest evaluate",
+        "model-fit.md: python -m damageest_evaluate.forms",
+        "your-own-scan.md: damageest evaluate",
+    ],
+}
+"""Why a command of a page is not run in a bare Debian, and where each reason stands."""
+
+
+def test_what_is_not_run_is_listed_here() -> None:
+    """Nobody can mark a command silently, and no mark stays that marks nothing."""
+    skipped = [(block.skipped, f"{name}: {block.commands()[0]}") for name, block in READ if block.skipped]
+    for reason, line in skipped:
+        assert any(line.startswith(start) for start in REASONS.get(reason, ())), f"{line}: not run: {reason}"
+    for reason, starts in REASONS.items():
+        for start in starts:
+            assert any(line.startswith(start) for why, line in skipped if why == reason), f"no mark for {start}"
+
+
+def test_each_mark_stands_above_a_block() -> None:
+    marks = sum(len(re.findall(r"^<!-- (?:not run|file): ", p.read_text(), re.MULTILINE)) for p in PAGES)
+    assert marks == sum(bool(block.skipped or block.file) for _, block in READ)
+
+
+def test_pages_for_users_take_what_the_readme_set_up() -> None:
+    """Neither uv nor pip is on the path there; `.uv/bin/uv` adds to what is there, and takes nothing away."""
+    for name, block in READ:
+        for command in [] if block.file or block.skipped else block.commands():
+            words = command.split()
+            assert words[0] not in ("uv", "pip", "pip3"), f"{name}: {command}"
+            if ".uv/bin/uv sync" in command and "--all-packages" not in words and "report" not in words:
+                assert "--inexact" in words, f"{name}: {command}"
+
+
+def test_the_runner_keeps_place_and_environment_and_counts_failures(tmp_path: Path) -> None:
+    reader = RUNNER.Reader(tmp_path, 0)
+    reader.begin(tmp_path)
+    for command in (
+        "mkdir here && cd here",
+        "export WORD='two words'",
+        'test "$WORD" = "two words"',
+        "test $(pwd) = $PWD",
+    ):
+        reader.run(command)
+    reader.run("exit 1  # exit status 1")
+    assert (reader.failed, reader.type_in("pwd").stdout) == (0, f"{tmp_path / 'here'}\n")
+    reader.run("nonsense")
+    assert reader.failed == 1
 
 
 def test_pages_show_commands() -> None:

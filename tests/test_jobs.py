@@ -1,4 +1,4 @@
-"""Every example job: the result is consistent, and right if the truth is known."""
+"""Every example job: the result is consistent, and right if the truth is known. All that runs them is slow."""
 
 from __future__ import annotations
 
@@ -36,23 +36,19 @@ WEDGE, CHIP = 5929.0, 65.1
 broke off the block between two scans."""
 
 
-SLOW = {*SITES, *STOCK} - {"gear_teeth"}
-"""Jobs that are run by -m slow only."""
-
-
 def mark_job(name: str) -> Any:
     """The name of a job; its tests are skipped where its part needs a plugin that cannot be used."""
-    slow = [pytest.mark.slow] if name in SLOW else []
     part = yamlfile.read(JOBS / f"{name}.yaml")[0]["part"]
     suffix = Path(part["path"] if isinstance(part, dict) else part).suffix
-    return pytest.param(name, marks=[*slow, needs_plugin("cadquery")] if suffix == ".step" else slow)
+    return pytest.param(name, marks=[needs_plugin("cadquery")] if suffix == ".step" else [])
 
 
 def test_every_job_is_listed() -> None:
     assert {path.stem for path in JOBS.glob("*.yaml")} == {*SITES, *STOCK, "bent_blade"}
 
 
-@pytest.mark.parametrize("name", map(mark_job, SITES))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [mark_job(name) for name in SITES])
 def test_example(name: str) -> None:
     result = damageest.run(JOBS / f"{name}.yaml")
     assert result.status == "ok"
@@ -67,7 +63,8 @@ def test_example(name: str) -> None:
         assert result.damage_volume == pytest.approx(true, rel=error)
 
 
-@pytest.mark.parametrize("name", map(mark_job, STOCK))
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [mark_job(name) for name in STOCK])
 def test_example_with_stock(name: str) -> None:
     result = damageest.run(JOBS / f"{name}.yaml")
     assert result.status == "ok"

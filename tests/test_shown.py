@@ -73,7 +73,7 @@ def test_without_pillow_the_section_stays_and_without_pyvista_the_extra_is_named
     html = result._repr_html_() or ""
     assert "<svg" in html
     assert "<img" not in html
-    with pytest.raises(StageError, match=r"damageest\[vtk\]"):
+    with pytest.raises(StageError, match=r"--extra vtk|damageest\[vtk\]"):
         result.plot()
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from multiprocessing import resource_tracker
 from typing import Any
 
-from damageest.errors import InputError, StageError
+from damageest.errors import InputError, StageError, describe_install
 from damageest.geometry.threads import count_cores
 
 CONNECT_SECONDS = 30
@@ -28,7 +28,7 @@ def require_dask() -> None:
         import distributed  # noqa: F401
     except ImportError:
         raise InputError(
-            'damageest batch needs dask distributed, which is not installed\n  try: pip install "damageest[batch]"'
+            f"damageest batch needs dask distributed, which is not installed\n  try: {describe_install('batch')}"
         ) from None
 
 

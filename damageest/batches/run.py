@@ -19,7 +19,7 @@ from damageest.batches.tasks import Ended, run_tasks
 from damageest.batches.work import compute_key, load_job, release, work
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.geometry.threads import count_cores
-from damageest.io.files import expand_home, working_folder
+from damageest.io.files import check_output_folder, expand_home, working_folder
 from damageest.isolation import measure_free_memory
 from damageest.isolation.limits import STAGE_SECONDS
 from damageest.pipeline.cache import describe_unwritable
@@ -73,6 +73,7 @@ def batch(
     found, folder = find_jobs(words, settings), expand_home(Path(output)).absolute()
     if not found:
         raise JobError([Fault("give at least one job file, folder or glob")], "batch")
+    check_output_folder(folder, "output")
     options = options or Options()
     rows = _find_done(found, folder) if options.cache else {}
     rows |= {job.name: _row(job, folder, outcome="refused", error=job.fault) for job in found if job.fault}

@@ -6,7 +6,8 @@ import numpy as np
 
 from damageest.artefacts import Deviation, Floats, Part, Reason, Scan, Sites
 from damageest.errors import InputError, StageError
-from damageest.geometry.noise import AUTO_STEPS, AUTO_TOLERANCE
+from damageest.geometry.noise import AUTO_STEPS, AUTO_TOLERANCE, measure_noise_and_spacing, measure_quiet_noise
+from damageest.geometry.sampling import sample_by_area
 
 FEW_POINTS = 100
 """Number of points below which a scan shows next to nothing of a part."""
@@ -37,6 +38,16 @@ ROUNDED = 0.6
 of them."""
 ALIKE = 0.5
 """Least number of points beyond the tolerance outside, for each of those inside, where scatter puts them there."""
+
+
+LARGE = 0.005
+"""Tolerance in diagonals from which on it may be more than half of each wall of a part."""
+ALL_THIN = 0.99
+"""Share of the skin with walls thinner than two tolerances from which on a job is refused."""
+FAR_BELOW = 2.0
+"""Noise over the tolerance from which on a job is refused before the alignment."""
+MOST_COMPARED = 100_000
+"""Points on the part, at most, that tell how rough it looks by itself."""
 
 
 def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float = 0.0) -> tuple[float, list[Reason]]:
@@ -154,11 +165,30 @@ def require_tolerance(tolerance: float, distance: Floats, part: Part, noise: flo
     scatter = measure_form_deviation(distance, max(NEAR_PART * part.diagonal, 8 * noise))
     if scatter <= tolerance:
         return
-    unit, noise = part.unit, min(scatter, noise)
-    least = AUTO_TOLERANCE * noise
-    raise InputError(
+    raise _refuse_tolerance(tolerance, min(scatter, noise), part)
+
+
+def require_above_noise(tolerance: float, scan: Scan, part: Part) -> None:
+    """Raises InputError where the tolerance is so far below the noise that no pose has to be found to say so, as one
+    that was measured in another unit.
+
+    Without a pose, noise comes out too large where the skin curves within a few gaps. So the quietest tenth of the scan
+    has to scatter by more than the tolerance too, and the part itself must look smooth with a quarter of the points.
+    """
+    if scan.noise <= FAR_BELOW * tolerance or not scan.spacing > 0 or measure_quiet_noise(scan.points) <= tolerance:
+        return
+    count = int(min(part.area / (2 * scan.spacing / 1.1) ** 2, MOST_COMPARED))
+    points, _ = sample_by_area(part, max(count, 1), np.random.default_rng(0))
+    smooth, spacing = measure_noise_and_spacing(points)
+    if spacing > 0 and smooth < tolerance / FAR_BELOW:
+        raise _refuse_tolerance(tolerance, scan.noise, part, "; is it a length in another unit than the scan's is now?")
+
+
+def _refuse_tolerance(tolerance: float, noise: float, part: Part, hint: str = "") -> InputError:
+    least, unit = AUTO_TOLERANCE * noise, part.unit
+    return InputError(
         f"tolerance: the noise of the scan is {noise:.2g} {unit}, and the tolerance {tolerance:.3g} {unit}: damage "
-        f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise",
+        f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise{hint}",
         topic="noise",
     )
 
@@ -221,14 +251,7 @@ def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
 
 def check_walls(tolerance: float, part: Part) -> list[Reason]:
     """A warning where the tolerance is so large that damage cannot be found in the part's walls; else nothing."""
-    from damageest.geometry.rays import prepare_rays
-    from damageest.geometry.sampling import sample_by_area
-
-    points, face = sample_by_area(part, 2000, np.random.default_rng(0))
-    normals = part.face_normals[face]
-    start = points - 1e-5 * part.diagonal * normals
-    thickness = prepare_rays(part).find_first(start, -normals)[0]
-    thickness = thickness[np.isfinite(thickness)]
+    thickness = _measure_walls(part)
     if not len(thickness):
         return []
     thin = float((thickness < 2 * tolerance).mean())
@@ -240,3 +263,31 @@ def check_walls(tolerance: float, part: Part) -> list[Reason]:
         f"of its surface (walls are {walls}): no damage can be found there"
     )
     return [Reason("thin_walls", text, amount=thin)]
+
+
+def require_walls(tolerance: float, part: Part) -> None:
+    """Raises InputError where the part has next to no wall that is thick enough for the tolerance: nothing can lie
+    deeper than that below its skin, so that nothing can be found."""
+    if tolerance < LARGE * part.diagonal:
+        return
+    thickness = _measure_walls(part)
+    if not len(thickness) or float((thickness < 2 * tolerance).mean()) < ALL_THIN:
+        return
+    unit, most = part.unit, float(np.quantile(thickness, ALL_THIN))
+    raise InputError(
+        f"tolerance: {tolerance:.3g} {unit} is more than half the thickness of the part nearly everywhere, which is "
+        f"{most:.3g} {unit} at most: no damage can be found; give far less than {most / 2:.2g} {unit}, or auto; is "
+        "`units` right, and is the tolerance in it?",
+        topic="unit",
+    )
+
+
+def _measure_walls(part: Part) -> Floats:
+    """The thickness of the part below points on its skin, as far as rays meet it again."""
+    from damageest.geometry.rays import prepare_rays
+
+    points, face = sample_by_area(part, 2000, np.random.default_rng(0))
+    normals = part.face_normals[face]
+    start = points - 1e-5 * part.diagonal * normals
+    thickness = prepare_rays(part).find_first(start, -normals)[0]
+    return np.asarray(thickness[np.isfinite(thickness)])

@@ -110,7 +110,7 @@ def _call_app() -> NoReturn:
     """Runs the command that the arguments name, and ends with its exit status."""
     try:
         working_folder()  # where it was deleted, no path has a place
-        app()
+        app(prog_name="damageest")  # also where it is called by `python -m damageest`
         sys.exit(0)
     except SystemExit as end:
         if end.code == _interrupt.STATUS:  # typer turns KeyboardInterrupt into it

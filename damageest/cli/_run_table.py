@@ -34,7 +34,7 @@ def print_table(result: Result, target: Path) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from damageest.findings import describe_interval
+    from damageest.findings import describe_interval, describe_volume
     from damageest.rules.advice import list_topics
     from damageest.rules.notes import cap_notes, list_notes, qualify_nothing
 
@@ -53,7 +53,8 @@ def print_table(result: Result, target: Path) -> None:
             table.add_column(name, justify="left" if name in ("method", "verdict") else "right")
         for site in result.sites:
             verdict = site.verdict.level + ("" if site.accepted == (site.verdict.level != "doubtful") else ", accepted")
-            numbers = [f"{site.damage.volume:.6g}", f"{site.surface.area:.6g}", f"{site.max_depth:.4g}"]
+            volume = describe_volume(site.damage.volume, site.volume_95)
+            numbers = [volume, f"{site.surface.area:.4g}", f"{site.max_depth:.4g}"]
             if len(heads) > 4:
                 stock = getattr(site.deposit, "stock_volume", None)
                 numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
@@ -63,7 +64,7 @@ def print_table(result: Result, target: Path) -> None:
         known = "" if result.volume_95 is None else f" (95 %: {describe_interval(result.volume_95)})"
         # what an earlier scan shows bounds no volume of its own
         whole = "" if result.part.unseen is not None else f"; part volume: {result.part.volume:.6g} {unit}³"
-        show(f"damage volume: {result.damage_volume:.6g} {unit}³{known}{whole}")
+        show(f"damage volume: {describe_volume(result.damage_volume, result.volume_95)} {unit}³{known}{whole}")
         if result.not_in_budget:
             show(f"not known, and in no interval: {', '.join(result.not_in_budget)}")
     elif not result.failures:

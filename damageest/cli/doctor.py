@@ -71,7 +71,7 @@ def examine(quick: bool) -> Findings:
     """Looks at the system and the packages; without ``quick``, runs a small job too."""
     from ctypes.util import find_library
 
-    from damageest.errors import EXTRAS
+    from damageest.errors import EXTRAS, describe_install
     from damageest.isolation.limits import measure_free_memory
     from damageest.registry import Registry
 
@@ -85,7 +85,7 @@ def examine(quick: bool) -> Findings:
         cores=len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1,
         memory_free=measure_free_memory(),
         packages=_list_packages(),
-        extras={name: "" if _has(name) else f'pip install "damageest[{name}]"' for name in names},
+        extras={name: "" if _has(name) else describe_install(name) for name in names},
         libraries={name: find_library(name) or "" for name in LIBRARIES},
         plugins=[f"{one}" for one in registry.providers],
         self_test=told,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,41 +27,87 @@ def command(
         Path | None, typer.Option("--job", "-o", help="Job file to write. Default: <part>.yaml in this folder.")
     ] = None,
     units: Annotated[str, typer.Option(help="Unit of files without a unit: um, mm, cm, m, in, ft.")] = "mm",
+    part_unit: Annotated[
+        str, typer.Option(help="Unit of the part's numbers. Default: the file's own, or --units.")
+    ] = "",
+    scan_unit: Annotated[
+        str, typer.Option(help="Unit of the scan's numbers. Default: the file's own, or --units.")
+    ] = "",
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Write a commented job file with values measured from part and scan."""
     from damageest.cli.part import read_pmi
     from damageest.errors import Fault, JobError
+    from damageest.io.files import moved_into_place
     from damageest.job import load
     from damageest.pipeline.prepare import inspect_inputs, keep_inputs
     from damageest.registry import Registry
 
     target = job or Path(f"{part.stem}.yaml")
+    _check_target(target)
     if target.exists() and not force:
         raise JobError(
             [Fault("the file exists already; overwrite it with --force, or name another file with --job")], str(target)
         )
-    source = {"version": 1, "units": units, "part": str(part), "scan": str(scan)}
+    own = [_check_unit(unit, name) for unit, name in ((part_unit, "--part-unit"), (scan_unit, "--scan-unit"))]
+    named_part, named_scan = (_name_file(str(path), unit) for path, unit in zip((part, scan), own, strict=True))
+    source = {"version": 1, "units": units, "part": named_part, "scan": named_scan}
     registry, read = Registry.discover(), dict[str, Any]()
     solid, cloud, tolerance, doubts = inspect_inputs(load(source, registry), registry, read)
     cautions = list(map(str, doubts))
     if swapped := _find_swap(part, scan, solid, cloud):
         cautions = [swapped, *cautions]
     paths = [os.path.relpath(path.resolve(), target.resolve().parent) for path in (part, scan)]
-    pmi = read_pmi(part, units, registry)
+    pmi = read_pmi(named_part, units, registry)
     lines = [
         *_describe_inputs(part, scan, solid, cloud, units, cautions),
-        *_write_values(paths, units, tolerance, pmi),
+        *_write_values(paths, own, units, tolerance, pmi),
         *_write_examples(target.stem, registry.methods(), tolerance),
     ]
-    target.write_text("\n".join(lines) + "\n", encoding="utf-8")
-    say(f"written to {target}; next: damageest run {target}")
+    with moved_into_place(target, "--job") as scratch:
+        scratch.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    say(f"written to {target}; next: {shlex.join(['damageest', 'run', str(target)])}")
     made = load(target, registry)
     if keep_inputs(made, registry, read):
         say(f"part and scan are kept for it in {made.output / 'stages'}")
     for caution in cautions:
         say(f"caution: {caution}", err=True)
+    if any(doubt.code == "unit" for doubt in doubts):
+        again = ["damageest", "init", str(part), str(scan), "--job", str(target), "--force", "--scan-unit", "UNIT"]
+        say(
+            "caution: the tolerance was measured in these units; with the right one write the job again, do not only "
+            f"change the unit in it: {shlex.join(again)} (or --part-unit, --units)",
+            err=True,
+        )
+
+
+def _check_target(target: Path) -> None:
+    """Raises JobError where the job file cannot be written, before the inputs are read. Its folder is not made: its
+    paths are beside it, and a folder that is not there is most likely misspelt."""
+    from damageest.errors import Fault, JobError
+    from damageest.io.files import check_output_file
+
+    check_output_file(target, "--job")
+    if not target.parent.is_dir():
+        remedy = f"make it ({shlex.join(['mkdir', '-p', str(target.parent)])}), or name another file"
+        raise JobError([Fault(f"there is no folder {target.parent} for {target.name}; {remedy}")], "--job")
+
+
+def _check_unit(name: str, option: str) -> str:
+    """The short name of a unit; empty for none. Raises JobError, which names the option, for an unknown one."""
+    from damageest.errors import Fault, InputError, JobError
+    from damageest.geometry.units import canonical_unit
+
+    try:
+        return canonical_unit(name) if name else ""
+    except InputError as error:
+        raise JobError([Fault(str(error))], option) from None
+
+
+def _name_file(path: str, unit: str) -> str | dict[str, str]:
+    """A file as a job names it, with its unit where that is given."""
+    return {"path": path, "unit": unit} if unit else path
 
 
 def _describe_inputs(part: Path, scan: Path, solid: Part, cloud: Scan, units: str, cautions: list[str]) -> list[str]:
@@ -75,7 +122,8 @@ def _describe_inputs(part: Path, scan: Path, solid: Part, cloud: Scan, units: st
     ]
 
 
-def _write_values(paths: list[str], units: str, tolerance: float, pmi: CadPmi) -> list[str]:
+def _write_values(paths: list[str], own: list[str], units: str, tolerance: float, pmi: CadPmi) -> list[str]:
+    """``own``: the units of part and scan, empty where not given."""
     said, profile = "", _choose_profile(pmi)
     if profile is not None and profile.value is not None:
         half = profile.value / 2
@@ -87,8 +135,10 @@ def _write_values(paths: list[str], units: str, tolerance: float, pmi: CadPmi) -
         "version: 1",
         f"units: {units:<20} # of all lengths in this file, and of files without a unit",
         f"tolerance: {tolerance:<16.4g} # lambda: points closer to the nominal surface are intact; or auto{said}",
-        f"part: {_quote(paths[0])}",
-        f"scan: {_quote(paths[1])}",
+        *(
+            f"{key}: " + (f"{{path: {_quote(path)}, unit: {unit}}}" if unit else _quote(path))
+            for key, path, unit in zip(("part", "scan"), paths, own, strict=True)
+        ),
         *_write_align(pmi, profile),
     ]
 

@@ -45,11 +45,14 @@ def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_
     from damageest.inspection.compare import inspect_step
     from damageest.inspection.page import write_page
     from damageest.inspection.record import NAME, PAGE, append_inspection, read_record
+    from damageest.io.files import check_output_file
 
     if tolerance is not None and not 0 < tolerance < float("inf"):
         raise JobError([Fault(f"a tolerance is a number above 0, not {tolerance}")], "--tolerance")
     if not scan.is_file():
         raise InputError(f"{scan}: there is no such file; give the scan made after the step")
+    for name in (NAME, PAGE):
+        check_output_file(folder / name, "OUT")
     aim = read_aim(folder, step)  # type: ignore[arg-type]
     if (folder / NAME).is_file():
         read_record(folder / NAME, aim)  # a record that cannot take the entry is said before the work

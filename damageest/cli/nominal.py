@@ -33,20 +33,25 @@ def command(
 
 def _average(folders: list[Path], output: Path) -> int:
     from damageest.errors import Fault, JobError
+    from damageest.io.files import check_output_file, moved_into_place
     from damageest.io.forms import FORM, average_forms, read_form, require_type, write_form
     from damageest.io.meshes import write_ply, write_stl
 
     writers = {".stl": write_stl, ".ply": write_ply}
     if output.suffix.lower() not in writers:
         raise JobError([Fault(f"'{output}' is neither STL nor PLY; name it with .stl or .ply")], "--output")
+    form = output.with_suffix(".npz")
+    for path in (output, form):
+        check_output_file(path, "--output")
     forms = [read_form(folder / FORM) for folder in dict.fromkeys(folders)]
     part = _read_part(folders[0])
     require_type(forms, part)
     mean, share = average_forms(forms, part)
-    output.parent.mkdir(parents=True, exist_ok=True)
-    writers[output.suffix.lower()](output, _deform(part, mean))
-    write_form(output.with_suffix(".npz"), mean)
-    say(f"written to {output} and {output.with_suffix('.npz')}: the mean of {len(forms)} parts")
+    mean_part = _deform(part, mean)
+    with moved_into_place(output, "--output") as solid, moved_into_place(form, "--output") as field:
+        writers[output.suffix.lower()](solid, mean_part)
+        write_form(field, mean)
+    say(f"written to {output} and {form}: the mean of {len(forms)} parts")
     if share < 1:
         say(f"note: {100 * (1 - share):.2g} % of its skin was seen on none of them, and goes on smoothly there")
     return 0

@@ -27,8 +27,9 @@ def command(
     end_with(lambda: _list_pmi(part, units, as_json), as_json)
 
 
-def read_pmi(part: Path, unit: str, registry: Registry) -> CadPmi:
-    """Datums and tolerances of a part's file, lengths in ``unit``. Raises JobError or InputError as a run would."""
+def read_pmi(part: str | dict[str, str], unit: str, registry: Registry) -> CadPmi:
+    """Datums and tolerances of a part's file, which is named as in a job; lengths in ``unit``. Raises JobError or
+    InputError as a run would."""
     from damageest.errors import JobError
     from damageest.isolation import Limits
     from damageest.job import load
@@ -37,9 +38,9 @@ def read_pmi(part: Path, unit: str, registry: Registry) -> CadPmi:
     from damageest.stages.scan import ReadScan
 
     try:  # the part is checked in the same way as in a job; no scan is needed
-        job = load({"version": 1, "units": unit, "part": str(part)}, registry, given={ReadScan: None})
+        job = load({"version": 1, "units": unit, "part": part}, registry, given={ReadScan: None})
     except JobError as error:
-        raise JobError(error.faults, str(part)) from None
+        raise JobError(error.faults, part if isinstance(part, str) else part["path"]) from None
     reader, item = job.stages[ReadPart], job.implementations[ReadPart]
     assert isinstance(reader, ReadPart)
     found = call_implementation(reader.cad_pmi, {"unit": unit}, reader, item, Limits())
@@ -52,7 +53,7 @@ def _list_pmi(part: Path, units: str, as_json: bool) -> int:
     from damageest.registry import Registry
 
     unit = canonical_unit(units)
-    found = read_pmi(part, unit, Registry.discover())
+    found = read_pmi(str(part), unit, Registry.discover())
     if as_json:
         say_json({"part": part, "units": unit, **asdict(found)})
         return 0

@@ -34,6 +34,7 @@ def command(
     import os
 
     from damageest.errors import Fault, JobError, suggest
+    from damageest.io.files import check_output_file
     from damageest.output.folder import open_output
     from damageest.output.pictures import LOOKS, SIDES, Picture, draw_picture
 
@@ -51,6 +52,7 @@ def command(
         raise JobError([Fault(f"given {len(sites)} times for {len(folders)} folders; give one for each")], "--site")
     if output.suffix.lower() != ".png":
         raise JobError([Fault(f"'{output}' is not a PNG file; name it with .png")], "--output")
+    check_output_file(output, "--output")
     opened = tuple(open_output(folder) for folder in folders)
     for folder, number in zip(opened, sites, strict=True):
         folder.check_site(number)

@@ -32,6 +32,7 @@ def _check(jobs: list[Path], settings: list[str], as_json: bool) -> int:
     """Prints what is wrong, and gives the exit status."""
     from damageest.errors import DamageestError, Fault, InputError, JobError, StageError
     from damageest.job import load
+    from damageest.pipeline.workspace import check_target
     from damageest.registry import Registry
 
     registry = Registry.discover()
@@ -41,6 +42,7 @@ def _check(jobs: list[Path], settings: list[str], as_json: bool) -> int:
     for path in jobs:
         try:
             job = load(path, registry, settings)
+            check_target(job.output)
             if any(stage.find_selectors() for stage in job.stages.values()):  # it is the engine that reads the part
                 from damageest.pipeline.selections import check_with_part
 

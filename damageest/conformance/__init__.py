@@ -18,7 +18,18 @@ except ImportError as error:
 pytest.register_assert_rewrite(
     *(
         f"{__name__}.{name}"
-        for name in ("_base", "_contracts", "_enclose", "_files", "_path", "_points", "_report", "_surface")
+        for name in (
+            "_adapt",
+            "_base",
+            "_contracts",
+            "_enclose",
+            "_files",
+            "_path",
+            "_points",
+            "_report",
+            "_surface",
+            "_written",
+        )
     )
 )
 

@@ -111,7 +111,8 @@ class AllowanceContract(BlockContract):
         assert deposit is None or deposit.volume >= self.make_inputs()["damage"].volume
 
     def test_alone_on_the_part(self) -> None:
-        assert self.run(others=None) is None or self.run(others=None).volume >= self.make_inputs()["damage"].volume
+        deposit = self.run(others=None)
+        assert deposit is None or deposit.volume >= self.make_inputs()["damage"].volume
 
     def test_the_cavity_holds_the_damage_and_is_filled(self) -> None:
         deposit = self.get_result()

@@ -19,6 +19,8 @@ _LEVELS = (16, 32, 64, 128, 256, 512)
 _WIDE = 8.0
 """Ratio of a patch's radius to the noise from which the patch is wide enough."""
 _SECTORS = 6
+QUIET = 0.1
+"""Share of the patches, the quietest, that `measure_quiet_noise` asks."""
 
 
 def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, float]:
@@ -79,6 +81,34 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
         if settled and k >= 64:
             break
     return noise, spacing
+
+
+def measure_quiet_noise(points: Floats, seed: int = 0) -> float:
+    """The noise of a scan with ``points`` (N,3) where it is least: on the quietest tenth of the patches.
+
+    Unlike `measure_noise_and_spacing` it is not too high where only some of the skin is curved or rough within a patch.
+    It is too low where a patch is narrower than `_WIDE` times the noise. 0 for fewer than 16 points.
+    """
+    points = np.asarray(points, dtype=np.float64)
+    count = _LEVELS[0]
+    if len(points) < count:
+        return 0.0
+    from scipy.spatial import cKDTree
+    from scipy.special import gammaincinv
+
+    rng = np.random.default_rng(seed)
+    centres = points[rng.choice(len(points), min(_SAMPLES[1], len(points)), replace=False)]
+    around = gather_around(points, centres, count, rng) if len(points) > _WHOLE else slice(None)
+    middle = centres.mean(axis=0)
+    near = points[around] - middle
+    _, index = cKDTree(near, balanced_tree=False, compact_nodes=False).query(centres - middle, k=count)
+    local, roundness = _to_principal_axes(near[index])
+    even = roundness > 0.15  # points in a row say nothing of the surface
+    if not even.any():
+        return 0.0
+    freedom = count - 6
+    expected = float(2 * gammaincinv(freedom / 2, QUIET) / freedom)
+    return float(np.sqrt(np.quantile(_measure_residual_variance(local[even]), QUIET) / expected))
 
 
 def _to_principal_axes(patches: Floats) -> tuple[Floats, Floats]:

@@ -1,4 +1,4 @@
-"""Checks that every reader makes before it reads a file, and the hash of a file."""
+"""Checks of files before they are read and before they are written, and the hash of a file."""
 
 from __future__ import annotations
 
@@ -6,11 +6,12 @@ import base64
 import hashlib
 import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from damageest.errors import DamageestError, InputError, describe_missing_library, is_interrupt
+from damageest.errors import DamageestError, Fault, InputError, JobError, describe_missing_library, is_interrupt
 
 WITHOUT_HOLES = 64 * 2**20
 """Size in bytes from which on it is checked that a file was written completely."""
@@ -132,3 +133,51 @@ def expand_home(path: Path) -> Path:
         return path.expanduser()
     except RuntimeError:
         return path
+
+
+def _refuse(text: str, option: str) -> JobError:
+    return JobError([Fault(text)], option, code="option" if option.startswith("--") else "output")
+
+
+def check_output_file(path: Path, option: str) -> None:
+    """Raises JobError, which names the ``option``, where no file can be written to ``path``: before the work, not
+    after it. Folders that are missing are made when it is written."""
+    try:
+        if path.is_dir():
+            raise _refuse(f"{path} is a folder; name a file, as {path / 'name'}{path.suffix}", option)
+        if path.exists() and not path.is_file():
+            raise _refuse(f"{path} is a pipe or a device; name a file", option)
+        check_output_folder(path.parent, option)
+        if path.exists() and not os.access(path, os.W_OK):
+            raise _refuse(f"{path} cannot be written: it is read-only; name another file", option)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise _refuse(f"{str(path)[-250:]}: cannot be written: {reason}; name another file", option) from None
+
+
+def check_output_folder(folder: Path, option: str) -> None:
+    """The same for a folder, which is made with its parents where it is missing."""
+    there = next((one for one in (folder, *folder.parents) if os.path.lexists(one)), folder)
+    if not os.path.isdir(there):  # which raises nothing, whatever the rights
+        what = "a file" if os.path.exists(there) else "a symbolic link that leads nowhere"
+        raise _refuse(f"{there} is {what}, not a folder; name another folder", option)
+    if not os.access(there, os.W_OK | os.X_OK):
+        raise _refuse(f"the folder {there} cannot be written; name another, or change its rights", option)
+
+
+@contextmanager
+def moved_into_place(path: Path, option: str) -> Iterator[Path]:
+    """Gives another name beside ``path``; the file that is written there takes its place when the block is done. One
+    that was there stays where the block fails. Raises JobError where it cannot be written, as on a full disk."""
+    path = Path(os.path.realpath(path))  # a link stays one
+    scratch = path.with_name(f".{path.stem}.partial{path.suffix}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield scratch
+        os.replace(scratch, path)
+    except OSError as error:
+        reason = error.strerror or error
+        raise _refuse(f"{path}: cannot be written: {reason}; name another file", option) from error
+    finally:
+        with suppress(OSError):
+            scratch.unlink(missing_ok=True)

@@ -13,7 +13,8 @@ from pydantic import ValidationError
 from damageest.errors import Fault, JobError, PluginError, clean_message, suggest
 from damageest.io.files import describe_no_file, resolve_path, working_folder
 from damageest.job import yamlfile
-from damageest.job.folders import describe_no_patches, describe_part_among, may_be_patches
+from damageest.job.beforehand import find_late_faults
+from damageest.job.folders import describe_no_patches, may_be_patches
 from damageest.job.model import Header, Job, find_paths
 from damageest.job.wording import describe_fault
 from damageest.registry import bundled
@@ -106,8 +107,7 @@ class _Check:
         contracts, method = self.find_route(method, chosen)
         pairs = {c: chosen.get(c) or self.find_default(c, method) for c in contracts if c not in self.given}
         stages = {c: self.check_stage(pair[0], pair[1]) for c, pair in pairs.items() if pair}
-        if among := describe_part_among(stages.get(ReadPart), stages.get(ReadScan)):
-            self.add_fault(among, ReadScan.stage, "path")
+        self.add_faults(find_late_faults(stages, method, self.registry))
         if header and not header.output and (header.name or stem) in (".", ".."):
             self.add_fault("'.' and '..' do not name a folder for the output; give another name, or  output", "name")
         if self.faults or header is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,8 +16,10 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.solids import concatenate_meshes
 from damageest.geometry.views import DIRECTIONS, OVERVIEWS, choose_view
 from damageest.io import colours
+from damageest.io.files import check_output_file, moved_into_place
 from damageest.isolation import Limits, call_isolated
 from damageest.output.folder import OutputFolder
+from damageest.output.graphics import describe_failure
 
 Look = Literal["damage", "points", "deviation", "deposit", "stock", "path"]
 LOOKS: tuple[Look, ...] = ("damage", "points", "deviation", "deposit", "stock", "path")
@@ -29,11 +32,6 @@ LEFT, EDGE, GROUND = "#c9d1d6", "#8a959c", "white"
 MOST_POINTS = 300_000
 TUBE = 0.2
 """Radius of a pass that is drawn, in bead widths."""
-NO_GRAPHICS = (
-    "the picture could not be drawn: this machine has no OpenGL, or its graphics driver failed",
-    "apt-get install libegl1 libgl1 libgl1-mesa-dri (OpenGL without a graphics card); or open report.html in a "
-    "browser: its pictures need none",
-)
 
 
 @dataclass(frozen=True)
@@ -50,36 +48,43 @@ class Picture:
 
 
 def draw_picture(picture: Picture, path: Path) -> None:
-    """Draws into a PNG file, in a process of its own: VTK ends the process where there is no OpenGL.
+    """Draws into a PNG file, in a process of its own: VTK ends the process where there is no OpenGL. An earlier picture
+    stays where it fails.
 
-    Raises StageError where that happens, InputError where a folder cannot be read.
+    Raises StageError where it fails, InputError where a folder cannot be read, JobError where the file cannot be
+    written.
     """
+    check_output_file(path, "--output")
     for folder in picture.folders:
         _ = folder.scan  # what is wrong with the files is said here, and not by the other process
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.unlink(missing_ok=True)
-    arguments = {"picture": picture, "path": str(path)}
-    try:
-        # VTK's messages say the same in many lines; they are the cause of the error, for --debug
-        call_isolated(draw_here, arguments, worker="picture", limits=Limits(seconds=0), show=False, stays=False)
-    except Exception as error:  # VTK and PyVista share none: where there is no library, ImportError
-        raise StageError(*NO_GRAPHICS, code="missing") from error
+    with moved_into_place(path, "--output") as scratch:
+        arguments = {"picture": picture, "path": str(scratch)}
+        try:
+            # VTK's messages say the same in many lines; they are the cause of the error, for --debug
+            call_isolated(draw_here, arguments, worker="picture", limits=Limits(seconds=0), show=False, stays=False)
+        except Exception as error:  # VTK and PyVista share none
+            raise describe_failure(error) from error
 
 
 def open_window(folder: OutputFolder, site: int) -> None:
-    """Opens a window with the layers of a result. Raises StageError where there is no display."""
+    """Opens a window with the layers of a result. Raises StageError where there is no display, or PyVista is not
+    installed."""
     import os
     import sys
 
     if sys.platform == "linux" and not (os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")):
         raise StageError(
             "there is no display for a window here",
-            f"damageest picture {folder.folder} -o picture.png, or open {folder.folder / 'report.html'} in a browser",
+            f"{shlex.join(['damageest', 'picture', str(folder.folder), '-o', 'picture.png'])}, or open "
+            f"{folder.folder / 'report.html'} in a browser",
             code="missing",
         )
-    import pyvista as pv
+    try:
+        import pyvista as pv
 
-    plotter = pv.Plotter(title=f"damageest: {folder.content['name']}")
+        plotter = pv.Plotter(title=f"damageest: {folder.content['name']}")
+    except Exception as error:
+        raise describe_failure(error, "the window could not be opened") from error
     plotter.set_background(GROUND)
     actors = _add_layers(plotter, folder)
     for k, (name, group) in enumerate(actors.items()):

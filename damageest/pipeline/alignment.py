@@ -5,7 +5,7 @@ from __future__ import annotations
 from contextlib import suppress
 
 from damageest.artefacts import Pose
-from damageest.checks.scan_quality import require_tolerance
+from damageest.checks.scan_quality import require_above_noise, require_tolerance, require_walls
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import AUTO_TOLERANCE
@@ -30,9 +30,12 @@ MEASURED = 20_000
 def align_scan(engine: Engine, state: JobState) -> tuple[Pose, StageError | None]:
     """Calls `align`. Where it refuses, and stage `adapt` may deform the part, it is called with a larger tolerance: too
     little of a deformed part lies on the part as designed. The refusal is then kept, and holds unless the adapted part
-    explains the scan. Raises InputError for a tolerance that is less than the noise."""
-    if state.asked_tolerance is not None and state.noise > state.tolerance:
-        check_noise(engine, state)
+    explains the scan. Raises InputError for a tolerance that is less than the noise, or more than the part is thick."""
+    if state.asked_tolerance is not None:
+        require_walls(state.tolerance, state.part)
+        if state.noise > state.tolerance:
+            require_above_noise(state.tolerance, state.scan, state.part)
+            check_noise(engine, state)
     try:
         pose: Pose = engine.call(Align, state).get(Align.gives)
         return pose, None

@@ -1,7 +1,7 @@
 """The output folder: written in a hidden sibling, moved into place when it is whole.
 
-No run that stops early touches the earlier output. One that is interrupted, or that fails where there is an earlier
-output, puts its finished stages into `stages/` of the output folder, where the next run finds them. One that is killed
+No run that stops early touches the earlier output. One that is interrupted or fails puts its finished stages into
+`stages/` of the output folder, where the next run finds them; a new folder then has nothing else. One that is killed
 leaves them in the hidden sibling, which the next run takes over.
 
 A folder that cannot be renamed, as a mount point, has its hidden folder within itself, and its files are replaced one
@@ -22,7 +22,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
-from damageest.errors import DamageestError, Fault, JobError
+from damageest.errors import Fault, JobError
+from damageest.io.files import check_output_folder
 from damageest.pipeline.cache import Cache, describe_unwritable
 from damageest.pipeline.own_files import finish_replacing, keep_own_files, refuse_names_in_use, replace_content
 
@@ -68,6 +69,7 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
     """
     try:
         _refuse_other_folder(target)
+        check_output_folder(target, "output")
         hidden = _make_hidden(target)
     except OSError as error:
         raise describe_unwritable(error, target) from None
@@ -88,15 +90,22 @@ def open_workspace(target: Path, use_cache: bool = True) -> Iterator[Workspace]:
         older = (target / "stages",) if use_cache else ()
         try:
             yield Workspace(target, folder, Cache(stages, older))
-        except DamageestError:
-            if not (target / "stages").is_dir():
-                shutil.rmtree(stages, ignore_errors=True)
-            raise
         except OSError as error:
             raise describe_unwritable(error, target) from error
         finally:
             if not (target / INSIDE / "moved").exists():  # else the next run moves the rest in
                 _clean_up(target, hidden)
+
+
+def check_target(target: Path) -> None:
+    """Raises JobError where a run could not write its output to ``target``, as far as that shows before it is tried.
+    Nothing is made or changed."""
+    try:
+        _refuse_other_folder(target)
+        refuse_names_in_use(target)
+        check_output_folder(target, "output")
+    except OSError as error:
+        raise describe_unwritable(error, target) from None
 
 
 def is_in_use(target: Path) -> bool:

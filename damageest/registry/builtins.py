@@ -119,12 +119,12 @@ def damageest_path_writers() -> Mapping[str, PathWriter]:
     from damageest.stages.export import PathWriter
     from damageest.stages.export.path_apt import write_apt
     from damageest.stages.export.path_csv import write_csv
-    from damageest.stages.export.rs274 import write_rs274
+    from damageest.stages.export.rs274 import check_rs274, write_rs274
 
     return {
         "csv": PathWriter(write_csv, "csv"),
         "apt": PathWriter(write_apt, "apt"),
-        "rs274": PathWriter(write_rs274, "ngc"),
+        "rs274": PathWriter(write_rs274, "ngc", check_rs274),
     }
 
 

@@ -37,3 +37,10 @@ METHODS = {"octree": "damageest-octree"}
 
 SUFFIXES = dict.fromkeys((".step", ".stp", ".iges", ".igs", ".brep"), "damageest-cadquery")
 """Suffix of a part's file to package."""
+
+PACKAGES = {
+    package
+    for brought in (COMMANDS, CONVERSIONS, FORMATS, PATH_FORMATS, IMPLEMENTATIONS, METHODS, SUFFIXES)
+    for package in brought.values()
+}
+"""All of them."""

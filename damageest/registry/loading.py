@@ -16,9 +16,16 @@ from typing import Any
 
 import pluggy
 
-from damageest.errors import PluginError, clean_message, find_missing_library, is_interrupt
+from damageest.errors import (
+    PluginError,
+    clean_message,
+    describe_install,
+    describe_pip_install,
+    find_missing_library,
+    is_interrupt,
+)
 from damageest.isolation import at_work
-from damageest.registry import hookspecs
+from damageest.registry import bundled, hookspecs
 
 GROUP = "damageest"
 OWN = "damageest"
@@ -124,7 +131,9 @@ def _suggest_remedy(error: BaseException, provider: Provider) -> str:
     if isinstance(error, PluginError) and error.remedy:
         return error.remedy
     if isinstance(error, ModuleNotFoundError) and error.name:
-        return f"pip install {error.name}, or reinstall {provider.name}"
+        if provider.name in bundled.PACKAGES:
+            return describe_install(provider.name)
+        return f"{describe_pip_install(error.name)}, or reinstall {provider.name}"
     if library := find_missing_library(error):
         return f"install the system package that has {library}"
     return f"update or uninstall {provider.name}"

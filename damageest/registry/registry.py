@@ -14,7 +14,7 @@ from typing import Any, NoReturn, TypeVar
 import pluggy
 from pydantic import ValidationError
 
-from damageest.errors import InputError, PluginError, clean_message, suggest
+from damageest.errors import InputError, PluginError, clean_message, describe_install, suggest
 from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
 from damageest.registry.loading import OWN, Broken, Provider, describe_broken, ignore_shadow_warnings, load
@@ -153,8 +153,7 @@ class Registry:
             if broken.provider.name == name:
                 reason = broken.reason.splitlines()[0]
                 return f"the plugin {name}, which cannot be used here ({reason}); try: {broken.remedy}"
-        remedy = f"uv sync --all-packages in a checkout, or pip install {name}"
-        return f"the plugin {name}, which is not installed; try: {remedy}"
+        return f"the plugin {name}, which is not installed; try: {describe_install(name)}"
 
     def describe_writer(self, name: str) -> str:
         """A clause for what needs a format that no package here writes: the plugin, the reason, and what to do. Empty

@@ -44,7 +44,8 @@ TOPICS = (
         ("unit",),
         "Look up in the scanner's software in which unit it wrote the file, or measure one length of the part in "
         "the scan. Give that unit for the scan, and not for the job, so that the results stay in the unit of the "
-        "CAD model.",
+        "CAD model. A tolerance that damageest init measured before is wrong by the same factor: write the job again "
+        "with --scan-unit, or take tolerance: auto.",
         "scan: {path: scan.ply, unit: m}",
     ),
     Topic(

@@ -82,7 +82,8 @@ class Stage(Options):
     ``per_site``, whether it runs once for each site or once for the job. A reader of part or scan sets ``reads``, the
     suffixes of its files. An implementation sets ``use``, its own name in a job, and ``isolated`` where it calls a
     native library: ``run`` then has a process of its own, and a crash, a hang or a lack of memory there is the error of
-    this stage. Its class has to be in a module that can be imported.
+    this stage. Its class has to be in a module that can be imported. ``modules``: Python modules that ``run`` imports
+    and that may not be installed.
     """
 
     model_config = ConfigDict(ser_json_inf_nan="strings", defer_build=True)
@@ -91,6 +92,7 @@ class Stage(Options):
     per_site: ClassVar[bool] = False
     reads: ClassVar[tuple[str, ...]] = ()
     isolated: ClassVar[bool] = False
+    modules: ClassVar[tuple[str, ...]] = ()
 
     use: str
 
@@ -112,6 +114,12 @@ class Stage(Options):
             return [found for step, item in items for found in walk(item, (*place, step))]
 
         return walk(self, ())
+
+    def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
+        """What is wrong with the options that shows only beside the other stages of the ``job``, which are by their
+        names, or in the files that they name; each with its place below the stage's name. Called before anything is
+        computed, so that no work is lost. ``registry``: what is installed."""
+        return []
 
     @classmethod
     def takes(cls) -> Mapping[str, Any]:

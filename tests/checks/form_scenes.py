@@ -20,7 +20,7 @@ def get_part(name: str = "plate") -> Part:
     return make_named_part(name)
 
 
-def draw_skin(name: str = "plate", count: int = 20_000) -> tuple[Floats, Floats]:
+def draw_skin(name: str = "plate", count: int = 8000) -> tuple[Floats, Floats]:
     """Points on the skin and the normals there."""
     part = get_part(name)
     points, face = sample_by_area(part, count, np.random.default_rng(1))

@@ -22,7 +22,7 @@ def run(part: Part, scan: Scan, **job: object) -> Result:
 
 
 def simulate(part: Part, **options: object) -> Scan:
-    return Simulate.model_validate({"points": 20_000, "noise": 0.04, **options}).run("mm", part)
+    return Simulate.model_validate({"points": 6000, "noise": 0.04, **options}).run("mm", part)
 
 
 def test_one_view_shows_the_top_and_nothing_is_claimed_of_the_rest() -> None:

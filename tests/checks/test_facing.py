@@ -14,8 +14,14 @@ from damageest.geometry.distance import signed_distance
 from damageest.geometry.solids import to_arrays
 
 TOLERANCE = 0.5
-PLATE = Manifold.cube((30, 20, 4))
-WALL = Manifold.cube((30, 0.8, 6)).translate((0, 9.6, 4))
+
+
+def make_plate(length: float) -> Any:
+    return Manifold.cube((length, 20, 4))
+
+
+def make_wall(length: float) -> Any:
+    return Manifold.cube((length, 0.8, 6)).translate((0, 9.6, 4))
 
 
 def find(nominal: Any, damaged: Any, spacing: float, noise: float) -> tuple[Flags, Floats]:
@@ -33,9 +39,9 @@ def find(nominal: Any, damaged: Any, spacing: float, noise: float) -> tuple[Flag
     return find_turned(scan, part, Deviation(distance, face, label), TOLERANCE), places
 
 
-@pytest.mark.parametrize(("spacing", "noise"), [(0.12, 0.06), (0.04, 0.06)])
-def test_the_root_of_a_thin_wall_is_found(spacing: float, noise: float) -> None:
-    found, places = find(PLATE + WALL, PLATE, spacing, noise)
+@pytest.mark.parametrize(("spacing", "noise", "length"), [(0.12, 0.06, 30), (0.04, 0.06, 10)])
+def test_the_root_of_a_thin_wall_is_found(spacing: float, noise: float, length: float) -> None:
+    found, places = find(make_plate(length) + make_wall(length), make_plate(length), spacing, noise)
     root = (np.abs(places[:, 1] - 10) < 0.25) & (places[:, 2] > 3.9)
     assert found[root].mean() > 0.65  # beside the wall the nearest skin may be the wall or the plate
     away = (np.abs(places[:, 1] - 10) > 1.5) | (places[:, 2] < 3.9)
@@ -44,5 +50,6 @@ def test_the_root_of_a_thin_wall_is_found(spacing: float, noise: float) -> None:
 
 @pytest.mark.parametrize("spacing", [0.3, 0.12, 0.06])
 def test_intact_skin_is_not_found(spacing: float) -> None:
-    found, _ = find(PLATE + WALL, PLATE + WALL, spacing, 0.12)
+    whole = make_plate(10) + make_wall(10)
+    found, _ = find(whole, whole, spacing, 0.12)
     assert found.mean() < 1e-3

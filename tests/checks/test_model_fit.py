@@ -30,7 +30,9 @@ def test_a_scale_is_named_with_its_size(scale: float) -> None:
     assert "scale" in found.fit.words
 
 
-@pytest.mark.parametrize(("how", "amount"), [("bend", 0.3), ("bend", 1.5), ("twist", 0.3)])
+@pytest.mark.parametrize(
+    ("how", "amount"), [("bend", 0.3), pytest.param("bend", 1.5, marks=pytest.mark.slow), ("twist", 0.3)]
+)
 def test_a_deformation_is_named_with_its_amount(how: str, amount: float) -> None:
     found = fit(add_noise(deform(draw_skin()[0], Deformation.model_validate({how: amount}), get_part())))
     assert found.fit.model == "deformed"

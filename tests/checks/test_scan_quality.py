@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from damageest_evaluate.parts import PARTS
@@ -12,9 +14,13 @@ from damageest.checks.scan_quality import (
     choose_tolerance,
     measure_form_deviation,
     raise_tolerance,
+    require_above_noise,
     require_intact,
+    require_walls,
 )
-from damageest.errors import StageError
+from damageest.errors import InputError, StageError
+from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.stages.scan.simulate import Simulate
 
 PART = PARTS["block"]()
 SCAN = Scan(np.zeros((1, 3)), noise=0.05, spacing=0.1)
@@ -64,6 +70,34 @@ def test_few_intact_points_stop_the_run() -> None:
     with pytest.raises(StageError, match="only 16% of the scan points near the part are intact") as caught:
         require_intact(deviate(0.05), 0.01, PART)
     assert "75 % of these points lie within 0.057 mm" in caught.value.remedy
+
+
+def test_a_tolerance_far_below_the_noise() -> None:
+    part = PARTS["lever"]()
+    scan = Simulate(points=30_000, noise=0.2, seed=3).run("mm", part)
+    noise, spacing = measure_noise_and_spacing(scan.points)
+    scan = replace(scan, noise=noise, spacing=spacing)
+    require_above_noise(0.2, scan, part)
+    with pytest.raises(InputError, match=r"noise of the scan is 0\.2 mm, .* at least 0\.8\d? mm.* in another unit"):
+        require_above_noise(0.05, scan, part)
+
+
+@pytest.mark.parametrize(("name", "points"), [("grille", 1500), ("ribbed_plate", 1000), ("tube", 300), ("blade", 600)])
+def test_points_too_far_apart_to_show_the_noise(name: str, points: int) -> None:
+    part = PARTS[name]()
+    scan = Simulate(points=points, noise=0.01, pose="random", seed=3).run("mm", part)
+    noise, spacing = measure_noise_and_spacing(scan.points)
+    assert noise > 0.1, "it comes out far too large"
+    for tolerance in (0.001, 0.05, 0.3):
+        require_above_noise(tolerance, replace(scan, noise=noise, spacing=spacing), part)
+
+
+def test_a_tolerance_beyond_all_walls() -> None:
+    low, high = np.sort(np.ptp(PART.vertices, axis=0))[[0, -1]]
+    require_walls(0.4 * low, PART)
+    require_walls(0.001 * low, PART)
+    with pytest.raises(InputError, match="no damage can be found; give far less than"):
+        require_walls(0.6 * high, PART)
 
 
 def test_a_tolerance_beyond_the_walls() -> None:

@@ -113,6 +113,7 @@ def test_a_misplaced_view_in_one_file_gives_no_accepted_site() -> None:
     assert sum(site.damage.volume for site in moved.sites) < 0.1 * sum(site.damage.volume for site in left.sites)
 
 
+@pytest.mark.slow
 def test_views_that_two_surfaces_tell_apart_give_no_site_and_one_line() -> None:
     """They are not moved, since one of them alone shows much of the skin: what it shows too deep is told, and stays in
     the total's high end."""

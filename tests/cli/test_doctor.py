@@ -7,12 +7,14 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from typer.testing import CliRunner
 
 from damageest import __version__
 from damageest.cli import app, doctor
+from damageest.errors import describe_install
 
 
 def test_a_sound_installation_gives_the_true_volume() -> None:
@@ -27,12 +29,12 @@ def test_a_sound_installation_gives_the_true_volume() -> None:
 
 
 def test_a_wrong_volume_and_a_missing_extra_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "JOB", doctor.JOB.replace("radius: 6.0", "radius: 5.0"))
+    monkeypatch.setattr("damageest.api.run", lambda job: SimpleNamespace(damage_volume=261.8))
     monkeypatch.setattr(doctor, "_has", lambda extra: extra != "report")
     done = CliRunner().invoke(app, ["doctor"])
     assert done.exit_code == 1
     assert "fault: the self-test gave a wrong volume" in done.output
-    assert 'extra report: not installed; pip install "damageest[report]"' in done.output
+    assert f"extra report: not installed; {describe_install('report')}" in done.output
 
 
 def test_the_shell_is_told_the_commands_that_a_word_begins(tmp_path: Path) -> None:

@@ -6,28 +6,19 @@ import os
 from pathlib import Path
 
 import pytest
-from typer.testing import CliRunner
 
-from damageest.cli import app
-from damageest.errors import DamageestError, StageError
+from damageest.errors import StageError
 from damageest.job import yamlfile
 from damageest.output.deviation_json import report_deviation
 from damageest.pipeline.fallback import drop_tried
 from tests import damaged_box
-
-
-def call(*words: str | Path) -> tuple[int, str]:
-    """Exit status and all output of a command in this process."""
-    done = CliRunner().invoke(app, [str(word) for word in words])
-    if isinstance(done.exception, DamageestError):  # `main` prints it
-        return done.exception.exit_status, f"{done.output}error: {done.exception}"
-    return done.exit_code, done.output
+from tests.cli.calls import call
 
 
 def test_a_new_job_is_valid_and_names_schema_methods_and_output(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    damaged_box.write(tmp_path)
+    damaged_box.write_least(tmp_path)
     monkeypatch.chdir(tmp_path)
     assert call("init", "box.stl", "scan.ply", "-o", "chip.yaml")[0] == 0
     text = Path("chip.yaml").read_text()
@@ -41,7 +32,7 @@ def test_a_new_job_is_valid_and_names_schema_methods_and_output(
 
 
 def test_part_and_scan_swapped_are_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    damaged_box.write(tmp_path)
+    damaged_box.write_least(tmp_path)
     monkeypatch.chdir(tmp_path)
     status, said = call("init", "scan.ply", "box.stl")
     assert status == 2
@@ -49,7 +40,7 @@ def test_part_and_scan_swapped_are_named(tmp_path: Path, monkeypatch: pytest.Mon
 
 
 def test_a_folder_is_no_job_and_its_jobs_are_listed(tmp_path: Path) -> None:
-    damaged_box.write(tmp_path)
+    damaged_box.write_least(tmp_path)
     status, said = call("run", tmp_path)
     assert status == 2
     assert "job.yaml" in said
@@ -60,7 +51,7 @@ def test_a_folder_is_no_job_and_its_jobs_are_listed(tmp_path: Path) -> None:
     ("setting", "wrong"), [("export.format=dxf", "dxf"), ("tolerance=-1", "-1"), ("cluster.link=2", "link")]
 )
 def test_a_wrong_setting_is_named_and_not_a_line_of_the_file(setting: str, wrong: str, tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path)
+    job = damaged_box.write_least(tmp_path)
     status, said = call("validate", job, "--set", setting)
     assert status == 2
     assert said.startswith(f"--set {setting}: ")
@@ -68,12 +59,16 @@ def test_a_wrong_setting_is_named_and_not_a_line_of_the_file(setting: str, wrong
     assert "job.yaml" not in said
 
 
-def test_a_run_that_fails_leaves_no_hidden_folder(tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path, damaged_box.JOB.replace("align: none", "align: {use: none, T_part_scan: T}"))
+def test_a_run_that_fails_keeps_its_stages_and_leaves_nothing_else(tmp_path: Path) -> None:
+    job = damaged_box.write_least(tmp_path)
+    job.write_text(job.read_text().replace("align: none", "align: {use: none, T_part_scan: T}"))
     far = "[[1, 0, 0, 90], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]"
     job.write_text(job.read_text().replace("T}", f"{far}}}"))
     assert call("run", "-q", job)[0] == 1
-    assert os.listdir(tmp_path / "out") == []
+    assert os.listdir(tmp_path / "out") == ["job"]
+    assert os.listdir(tmp_path / "out/job") == ["stages"]
+    assert {path.name.split("-")[0] for path in (tmp_path / "out/job/stages").iterdir()} >= {"part", "scan"}
+    assert "no result.json" in call("view", tmp_path / "out/job")[1]
 
 
 def test_aliases_that_expand_without_end_are_refused(tmp_path: Path) -> None:

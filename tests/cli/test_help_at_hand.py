@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -19,7 +20,6 @@ from damageest.error_codes import ERROR_CODES, EXIT_STATUSES, STAGE_PAGES, descr
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.registry.contracts import STAGES
 from damageest.rules.advice import TOPICS
-from tests import damaged_box
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "command-line.md").read_text()
@@ -71,11 +71,11 @@ def test_every_error_and_exit_status_is_explained_in_the_words_of_the_page() -> 
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def folder(_small_job: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a sound job that has run, and three that cannot."""
     place = tmp_path_factory.mktemp("help")
-    job = damaged_box.write(place)
-    assert CliRunner().invoke(app, ["run", "-q", str(job)]).exit_code == 0
+    shutil.copytree(_small_job, place, dirs_exist_ok=True)
+    job = place / "job.yaml"
     text = job.read_text()
     (place / "typo.yaml").write_text(text.replace("align: none", "align: nine"))
     (place / "empty.ply").write_text("ply\n")

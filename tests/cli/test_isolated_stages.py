@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -13,19 +10,21 @@ import pytest
 import damageest
 from damageest.errors import StageError
 from damageest.isolation import Limits, end_workers
+from damageest.result import Result
 from tests import damaged_box
+from tests.cli.calls import call
 from tests.registry.test_registry import GROWN, Site, site
 
 __all__ = ["site"]
-CLUSTER = '''
-from damageest.artefacts import Deviation, Sites
-from damageest.stages.cluster import Cluster
+ALIGN = '''
+from damageest.artefacts import Part, Pose, Scan
+from damageest.stages.align import Align
 
-class Faulty(Cluster):
+class Faulty(Align):
     """As native libraries are at times."""
     isolated = True
     use: Literal["faulty"] = "faulty"
-    def run(self, deviation: Deviation) -> Sites:
+    def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         BODY
 
 @hookimpl
@@ -37,7 +36,7 @@ FAULTS = {
     "abort": ("import os; os.abort()", "ended by an abort (SIGABRT)"),
     "exit at once": ("import os; os._exit(0)", "ended its process with exit status 0"),
     "memory": ("import numpy as np; np.ones(30 * 10**9 // 8)", "that --memory leaves it"),
-    "hang": ("while True: pass", "not finished after 1 s, the time limit of a stage"),
+    "hang": ("while True: pass", "not finished after 0.5 s, the time limit of a stage"),
 }
 ONCE = '''
 from pathlib import Path
@@ -70,73 +69,62 @@ def _end() -> Iterator[None]:
     end_workers()
 
 
-def run(job: Path, site: Site, *words: str) -> subprocess.CompletedProcess[str]:
-    code = "from damageest.cli import main; main()"
-    paths = os.pathsep.join([str(site.folder), os.environ.get("PYTHONPATH", "")])
-    return subprocess.run(
-        [sys.executable, "-c", code, "run", str(job), *words],
-        capture_output=True,
-        text=True,
-        env={**os.environ, "PYTHONPATH": paths},
-        check=False,
-    )
+@pytest.mark.parametrize(
+    "name",
+    [name if name in ("abort", "memory", "hang") else pytest.param(name, marks=pytest.mark.slow) for name in FAULTS],
+)
+def test_each_fault_is_the_stages_own(name: str, site: Site, small_done: Path) -> None:
+    """From Python."""
+    body, text = FAULTS[name]
+    output = small_done.parent / "out/job"
+    before = damaged_box.content(output)
+    site.add("acme-bad", ALIGN.replace("BODY", body))
+    limits = Limits(4 * 10**9, 0.5 if name == "hang" else 60)
+    with pytest.raises(StageError) as caught:
+        damageest.run(small_done, output=True, settings=["align=faulty"], limits=limits)
+    assert text in caught.value.message
+    assert str(caught.value).startswith("align: faulty: ")
+    assert "acme-bad 1.2" in caught.value.remedy or name == "memory"
+    after = damaged_box.content(output)
+    assert {file: after[file] for file in before} == before
 
 
-def test_each_fault_is_the_stages_own(site: Site, tmp_path: Path) -> None:
-    """From Python: a worker process for each source of the plugin, so each fault has its own."""
-    path = damaged_box.write_small(tmp_path)
-    damageest.run(path, output=True)
-    before = damaged_box.content(tmp_path / "out/job")
-    for name, (body, text) in FAULTS.items():
-        module = f"acme-{name.replace(' ', '-')}"
-        site.add(module, CLUSTER.replace("BODY", body).replace("faulty", module))
-        limits = Limits(4 * 10**9, 1 if name == "hang" else 60)
-        with pytest.raises(StageError) as caught:
-            damageest.run(path, output=True, settings=[f"cluster={module}"], limits=limits)
-        assert text in caught.value.message
-        assert str(caught.value).startswith(f"cluster: {module}: ")
-        assert f"{module} 1.2" in caught.value.remedy or name == "memory"
-        after = damaged_box.content(tmp_path / "out/job")
-        assert {file: after[file] for file in before} == before
+def test_a_hang_on_the_command_line(site: Site, small_done: Path) -> None:
+    site.add("acme-bad", ALIGN.replace("BODY", FAULTS["hang"][0]))
+    status, said = call("run", small_done, "--set", "align=faulty", "--stage-timeout", "0.5")
+    assert status == 1
+    assert "align: faulty: was ended: not finished after 0.5 s" in " ".join(said.split())
+    assert "  align: faulty  " in said, "the stage is named when it begins"
+    assert "acme-bad 1.2" in said
 
 
-def test_a_hang_on_the_command_line(site: Site, tmp_path: Path) -> None:
-    site.add("acme-bad", CLUSTER.replace("BODY", FAULTS["hang"][0]))
-    job = damaged_box.write_small(tmp_path, "cluster: faulty\n")
-    done = run(job, site, "--stage-timeout", "1", "--memory", "4GB")
-    assert done.returncode == 1
-    assert "cluster: faulty: was ended: not finished after 1 s" in " ".join(done.stderr.split())
-    assert "  cluster: faulty  " in done.stderr, "the stage is named when it begins"
-    assert "acme-bad 1.2" in done.stderr
-
-
-def test_sys_exit_in_a_stage_without_a_process_of_its_own(site: Site, tmp_path: Path) -> None:
+def test_sys_exit_in_a_stage_without_a_process_of_its_own(site: Site, small_done: Path) -> None:
     body = "return Solid(damage.vertices * self.factor, damage.faces)"
     site.add("acme-bad", GROWN.replace(body, "import sys; sys.exit(0)"))
-    result = damageest.run(damaged_box.write_small(tmp_path, "allowance: doubled\n"))
+    result = damageest.run(small_done, settings=["allowance=doubled"], output=True)
     assert any("allowance: doubled (site 1): called sys.exit(0)" in text for text in result.failures)
     assert "acme-bad 1.2" in " ".join(result.failures)
 
 
-def test_method_auto_goes_on_after_a_crash(site: Site, tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
-    """The site that is lost to the crash is found by the other method. What a worker prints goes to the error
-    stream."""
+@pytest.mark.slow
+def test_method_auto_goes_on_after_a_crash(site: Site, small_done: Path, tmp_path: Path) -> None:
+    """The site that is lost to the crash is found by the other method."""
     site.add("acme-once", ONCE)
-    path = damaged_box.write_small(tmp_path)
-    result = damageest.run(path, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"])
+    result = damageest.run(small_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
     assert (tmp_path / "crashed").exists()
     assert result.status == "ok"
     assert [item.method for item in result.sites] == ["surface"]
     assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
+
+
+def test_the_same_result_as_without_isolation(
+    site: Site, small_done: Path, small_result: Result, tmp_path: Path, capfd: pytest.CaptureFixture[str]
+) -> None:
+    """What a worker prints goes to the error stream."""
+    site.add("acme-once", ONCE)
+    (tmp_path / "crashed").touch()
+    isolated = damageest.run(small_done, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"], output=True)
+    assert isolated.sites[0].damage.vertices.tobytes() == small_result.sites[0].damage.vertices.tobytes()
     out, err = capfd.readouterr()
     assert "hello" in err
     assert "hello" not in out
-
-
-def test_the_same_result_as_without_isolation(site: Site, tmp_path: Path) -> None:
-    site.add("acme-once", ONCE)
-    (tmp_path / "crashed").touch()
-    path = damaged_box.write_small(tmp_path)
-    isolated = damageest.run(path, settings=[f"boolean={{use: once, mark: {tmp_path / 'crashed'}}}"])
-    own = damageest.run(path)
-    assert isolated.sites[0].damage.vertices.tobytes() == own.sites[0].damage.vertices.tobytes()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import hashlib
+import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -27,8 +29,9 @@ from damageest.artefacts import (
     Solid,
 )
 from damageest.conformance import _scene
-from damageest.conformance._base import PlacementContract, StageContract
+from damageest.conformance._base import PlacementContract, StageContract, to_bytes
 from damageest.io.meshes import write_stl
+from damageest.result import Result
 from damageest.stages.adapt import Adapt
 from damageest.stages.align.none import KnownPose
 from damageest.stages.allowance.none import NoAllowance as NoAllowance
@@ -43,8 +46,7 @@ from damageest.stages.export.files import Files
 from damageest.stages.part.file import PartFile
 from damageest.stages.reconstruct.signed_distance import SignedDistance
 from damageest.stages.repair.none import NoRepair as NoRepair
-from damageest.stages.report import ReportFiles
-from damageest.stages.report.html import Html
+from damageest.stages.report import Report, ReportFiles
 from damageest.stages.sample.uniform import Uniform
 from damageest.stages.scan.simulate import Simulate
 from damageest.stages.segment.mesh_distance import MeshDistance
@@ -62,6 +64,16 @@ class Still(Adapt):
     def run(self, part: Part) -> AdaptedPart | None:
         still = np.zeros(part.vertices.shape)
         return AdaptedPart(part, still, np.eye(4), still[None], 0.0, 0.0)
+
+
+class Sentence(Report):
+    """Writes one sentence."""
+
+    use: Literal["sentence"] = "sentence"
+
+    def run(self, result: Result, folder: Path) -> ReportFiles:
+        (folder / "report.txt").write_text(f"{len(result.sites)} sites, {result.damage_volume:.6g}\n")
+        return ReportFiles(("report.txt",))
 
 
 GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
@@ -82,7 +94,7 @@ GOOD: dict[str, tuple[Any, dict[str, Any]]] = {
     "Allowance": (NoAllowance(), {}),
     "Path": (BEADS, {}),
     "Export": (Files(), {}),
-    "Report": (Html(), {}),
+    "Report": (Sentence(), {}),
 }
 MEANING = {
     "Part": "test_has_the_volume_of_its_file",
@@ -166,6 +178,21 @@ def edit_input(result: Any, given: dict[str, Any]) -> Any:
     return result
 
 
+MADE: dict[tuple[str, ...], Any] = {}
+"""Results of the good implementations, by the inputs: the faults are added to them, and not to runs of their own."""
+
+
+def make_good(base: Any, checks: Any, stage: Any, given: dict[str, Any]) -> Any:
+    """What a good implementation gives; it is computed once for each of its inputs."""
+    if base in (conformance.PartContract, conformance.ExportContract, conformance.ReportContract):
+        return base.call(checks, stage, given)  # it reads or writes files
+    data = pickle.dumps({name: to_bytes(value) for name, value in given.items()})
+    key = (base.__name__, repr(stage), hashlib.sha256(data).hexdigest())
+    if key not in MADE:
+        MADE[key] = base.call(checks, stage, given)
+    return MADE[key]
+
+
 def make_checks(name: str, tmp_path: Path, fault: Fault) -> Any:
     """The checks of a contract on an implementation that has a fault."""
     stage, told = GOOD[name]
@@ -175,7 +202,7 @@ def make_checks(name: str, tmp_path: Path, fault: Fault) -> Any:
         stage = PartFile(path=tmp_path / "prism.stl")
 
     def call(self: Any, stage: Any, given: dict[str, Any]) -> Any:
-        return fault(base.call(self, stage, given), given)
+        return fault(make_good(base, self, stage, given), given)
 
     made = type("Case", (base,), {"stage": stage, "call": call, **told})()
     if name in ("Export", "Report"):

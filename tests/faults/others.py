@@ -138,7 +138,7 @@ def short_path() -> DepositPath:
 def _read_pmi(path: Path, registry: Any) -> None:
     from damageest.cli.part import read_pmi
 
-    read_pmi(path, "mm", registry)
+    read_pmi(str(path), "mm", registry)
 
 
 def _read_matrix(path: Path, registry: Any) -> None:

@@ -58,10 +58,8 @@ class Worker:
     def try_job(self, path: Path, mode: str = "read", seconds: float = SECONDS) -> Row:
         """The outcome of one job or file."""
         if self.child is None:
-            command = [sys.executable, "-m", "tests.faults.worker"]
-            root = Path(__file__).parents[2]
-            self.child = subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1, cwd=root)
-            assert self._wait(120) == "ready\n"
+            self.start()
+        assert self.child
         assert self.child.stdin
         self.peak = 0
         self.child.stdin.write(f"{mode} {path}\n")
@@ -76,6 +74,13 @@ class Worker:
         status = self.child.returncode
         self.child = None
         return {"outcome": answer or "crash", "words": f"exit status {status}", "seconds": seconds, "peak": self.peak}
+
+    def start(self) -> None:
+        """Starts the child, which then waits for jobs."""
+        command = [sys.executable, "-m", "tests.faults.worker"]
+        root = Path(__file__).parents[2]
+        self.child = subprocess.Popen(command, stdin=-1, stdout=-1, text=True, bufsize=1, cwd=root)
+        assert self._wait(120) == "ready\n"
 
     def _wait(self, seconds: float) -> str:
         """The next line of the child, or what went wrong: 'hang', 'memory', or '' where it died."""
@@ -108,7 +113,7 @@ def make_cases(count: int, seed: int, names: list[str], share: float = 0.0) -> I
     """Spoiled files. The same arguments, the same files; the first of a larger count are those of a smaller one."""
     for number in range(count):
         name = names[number % len(names)]
-        kind = KINDS[number // len(names) % len(KINDS)]
+        kind = KINDS[sum(divmod(number, len(names))) % len(KINDS)]  # the first few already have every way
         whole = name not in others.FILES and random.Random(f"{seed}/whole/{number}").random() < share
         yield Case(name, kind, spoil(find_seed(name), name, kind, random.Random(f"{seed}/{name}/{number}")), whole)
 
@@ -140,25 +145,27 @@ def fuzz(
     names: list[str] | None = None,
     tell: Callable[[Row], None] = lambda row: None,
     first: int = 0,
+    worker: Worker | None = None,
 ) -> list[Row]:
-    """The outcome of each spoiled file, from the number ``first`` on."""
-    worker, rows = Worker(), list[Row]()
+    """The outcome of each spoiled file, from the number ``first`` on. ``worker``: one that goes on afterwards."""
+    own, rows = worker or Worker(), list[Row]()
     with tempfile.TemporaryDirectory() as held:
         folder = Path(held)
         seeds.write_others(folder)
         if whole:
-            make_earlier(folder, worker)
+            make_earlier(folder, own)
         try:
             for number, case in islice(enumerate(make_cases(count, seed, names or NAMES, whole)), first, None):
                 before = damaged_box.content(folder / KEPT) if case.whole else {}
-                row = worker.try_job(write_case(folder, case), "run" if case.whole else "read")
+                row = own.try_job(write_case(folder, case), "run" if case.whole else "read")
                 if case.whole and (lost := find_loss(folder / KEPT, before, row["outcome"])):
                     row |= {"outcome": "lost", "words": f"{lost}; was {row['outcome']}: {row.get('words')}"}
-                    make_earlier(folder, worker)
+                    make_earlier(folder, own)
                 rows.append({"number": number, "name": case.name, "kind": case.kind, "whole": case.whole, **row})
                 tell(rows[-1])
         finally:
-            worker.stop()
+            if worker is None:
+                own.stop()
     return rows
 
 

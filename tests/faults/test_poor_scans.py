@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+import damageest
 from damageest.cli import app
 from damageest.io.meshes import write_points
+from damageest.result import Result
 from tests import damaged_box
 
 RNG = np.random.default_rng(0)
-INTACT = damaged_box.scan()[damaged_box.scan()[:, 2] < 9.5]
+INTACT = damaged_box.scan(6000)[damaged_box.scan(6000)[:, 2] < 9.5]
 LINE = np.column_stack([np.linspace(-15, 15, 300), np.zeros(300), np.full(300, -10.0)])
 PLANE = np.column_stack([RNG.uniform(-19, 19, 900), RNG.uniform(-14, 14, 900), np.full(900, -10.0)])
 POOR = {
@@ -28,7 +30,7 @@ POOR = {
 
 
 def write(folder: Path, points: np.ndarray, job: str) -> Path:
-    path = damaged_box.write(folder, job)
+    path = damaged_box.write(folder, job, 60)
     x, y, z = points.T
     write_points(folder / "scan.ply", {"x": x, "y": y, "z": z})
     return path
@@ -51,20 +53,32 @@ def test_no_damage_is_found_in_next_to_nothing(name: str, tolerance: str, tmp_pa
     assert "that the scan shows" in done.stdout
 
 
-@pytest.mark.parametrize("align", ["none", pytest.param("register", marks=SLOW)])
-def test_far_points_are_set_aside_counted_and_said(align: str, tmp_path: Path) -> None:
-    """Twenty points a thousand diagonals away change nothing of what is found."""
-    job = damaged_box.JOB.replace("align: none", f"align: {align}")
-    points = damaged_box.scan()
-    direction = RNG.normal(size=(20, 3))
-    far = 1000 * 54 * direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    volumes = []
-    for scan in (points, np.vstack([points[:7000], far, points[7000:]])):
-        done = CliRunner().invoke(app, ["run", str(write(tmp_path, scan, job))])
-        assert done.exit_code == 0, (done.output, done.exception)
-        content = json.loads((tmp_path / "out/job/result.json").read_text())
-        volumes.append(content["damage_volume"])
-        assert content["scan"]["points"] == len(points)
-    assert volumes[0] == volumes[1]
-    assert [note["amount"] for note in content["warnings"] if note["code"] == "far_points"] == [20]
+DIRECTION = RNG.normal(size=(20, 3))
+FAR = 1000 * 54 * DIRECTION / np.linalg.norm(DIRECTION, axis=1, keepdims=True)
+"""Twenty points a thousand diagonals away."""
+
+
+def run_with_far_points(path: Path) -> tuple[float, list[int]]:
+    """The damage volume of the job with them in its scan of 6000 points, and how many were told as far."""
+    points = damaged_box.scan(6000)
+    x, y, z = np.vstack([points[:2000], FAR, points[2000:]]).T
+    write_points(path.parent / "scan.ply", {"x": x, "y": y, "z": z})
+    done = CliRunner().invoke(app, ["run", str(path)])
+    assert done.exit_code == 0, (done.output, done.exception)
     assert "20 scan points were set aside" in " ".join(done.stdout.split())
+    content = json.loads((path.parent / "out/job/result.json").read_text())
+    assert content["scan"]["points"] == len(points)
+    return content["damage_volume"], [n["amount"] for n in content["warnings"] if n["code"] == "far_points"]
+
+
+def test_far_points_are_set_aside_counted_and_said(small_done: Path, small_result: Result) -> None:
+    """They change nothing of what is found."""
+    assert run_with_far_points(small_done) == (small_result.damage_volume, [20])
+
+
+@pytest.mark.slow
+def test_far_points_are_set_aside_before_the_scan_is_aligned(tmp_path: Path) -> None:
+    path = damaged_box.write_small(tmp_path)
+    path.write_text(path.read_text().replace("align: none", "align: register"))
+    without = damageest.run(path).damage_volume
+    assert run_with_far_points(path) == (without, [20])

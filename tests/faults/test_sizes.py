@@ -8,17 +8,21 @@ from pathlib import Path
 import pytest
 
 from damageest.registry import Registry
-from tests.faults.sizes import Case, Row, compare_rows, list_cases, read_rows, run_case, write_rows
+from tests.faults.sizes import Case, Row, compare_rows, list_cases, list_cheap, read_rows, run_case, write_rows
 
-DEFAULT = list_cases()
+CHEAP, DEFAULT = list_cheap(), list_cases()
 ALL = [*DEFAULT, *(case for case in list_cases(whole=True) if case not in DEFAULT)]
+
+
+def mark(case: Case) -> tuple[pytest.MarkDecorator, ...]:
+    return () if case in CHEAP else (pytest.mark.slow,) if case in DEFAULT else (pytest.mark.nightly,)
+
+
 ENOUGH = 5000
 """Points from which a pose is found; below it a refusal is right."""
 
 
-@pytest.mark.parametrize(
-    "case", [pytest.param(case, id=case.name, marks=() if case in DEFAULT else pytest.mark.slow) for case in ALL]
-)
+@pytest.mark.parametrize("case", [pytest.param(case, id=case.name, marks=mark(case)) for case in ALL])
 def test_a_job_of_any_size_is_right_or_doubted_or_refused_in_words(case: Case, registry: Registry) -> None:
     row = run_case(case, registry)
     assert row.outcome in ("right", "inside", "said", "refused"), row

@@ -234,6 +234,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "neighbourhoods.measure_local_areas": lambda r: expect(neighbourhoods.measure_local_areas(r.points), (r.count,)),
     "noise.find_least_depth": lambda r: expect(noise.find_least_depth(r.points[:, 0], 0.1, 0.0, 0.1), (None,)),
     "noise.measure_noise_and_spacing": lambda r: expect(np.array(noise.measure_noise_and_spacing(r.points)), (2,)),
+    "noise.measure_quiet_noise": lambda r: expect(np.array([noise.measure_quiet_noise(r.points)]), (1,)),
     "open_surfaces.centre_points": lambda r: expect(open_surfaces.centre_points(r.points), (3,)),
     "open_surfaces.thin_for_surface": lambda r: expect(open_surfaces.thin_for_surface(r.points, 1.0), (None, 3)),
     "open_surfaces.orient_points": lambda r: expect(

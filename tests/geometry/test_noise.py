@@ -33,18 +33,18 @@ def scan(name, count, sigma, seed=0):
 @pytest.mark.parametrize("relative", [2e-4, 5e-4, 2e-3])
 def test_noise_is_recovered_on_edges_and_curves(name, relative):
     sigma = relative * float(np.linalg.norm(PARTS[name].extents))
-    noise, _ = measure_noise_and_spacing(scan(name, 60_000, sigma))
+    noise, _ = measure_noise_and_spacing(scan(name, 30_000, sigma))
     assert noise == pytest.approx(sigma, rel=0.12)
 
 
 @pytest.mark.parametrize("name", ["block", "grooved"])
 def test_a_scan_without_noise_has_none(name):
-    noise, spacing = measure_noise_and_spacing(scan(name, 60_000, 0.0))
+    noise, spacing = measure_noise_and_spacing(scan(name, 30_000, 0.0))
     assert noise < 1e-6 * spacing
 
 
 def test_a_curved_scan_without_noise_has_next_to_none():
-    noise, _ = measure_noise_and_spacing(scan("ring", 60_000, 0.0))
+    noise, _ = measure_noise_and_spacing(scan("ring", 30_000, 0.0))
     assert noise < 2e-5 * float(np.linalg.norm(PARTS["ring"].extents))
 
 

@@ -9,10 +9,12 @@ import pytest
 import trimesh
 
 import damageest
+from damageest.artefacts import Mesh
 from damageest.io import part_store
 from damageest.io.part_store import recall, use_part_store
 from damageest.result import Result
-from damageest.stages.align._prepare_part import _prepare_once
+from damageest.stages.align import _prepare_part
+from damageest.stages.align._field import PartSurface
 
 
 @pytest.fixture
@@ -101,13 +103,14 @@ def test_the_folder_does_not_grow_without_limit(folder: Path, monkeypatch: pytes
 
 
 def run(cache: bool = True) -> Result:
-    _prepare_once.cache_clear()  # as in another process
+    _prepare_part._prepare_once.cache_clear()  # as in another process
     box = trimesh.creation.box((40, 30, 20))
     points, _ = trimesh.sample.sample_surface(box, 8000, seed=1)
     points = points[np.linalg.norm(points - [20, 15, 10], axis=1) > 6]
     return damageest.run({"version": 1, "tolerance": 0.2}, part=box, scan=points, cache=cache)
 
 
+@pytest.mark.slow
 def test_a_run_gives_the_same_with_and_without_what_is_kept(folder: Path) -> None:
     without = run(cache=False)
     assert not folder.exists()
@@ -117,3 +120,21 @@ def test_a_run_gives_the_same_with_and_without_what_is_kept(folder: Path) -> Non
     for other in (cold, warm):
         assert without.pose.T_part_scan.tobytes() == other.pose.T_part_scan.tobytes()
         assert [len(site.damage.faces) for site in without.sites] == [len(site.damage.faces) for site in other.sites]
+
+
+def test_what_is_kept_of_a_part_is_what_was_computed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All that an alignment takes from it: the grid of planes and the table of pairs."""
+    monkeypatch.setattr(_prepare_part, "SURFACE_POINTS", 2000)
+    box = trimesh.creation.box((0.7, 0.5, 0.4))
+    mesh = Mesh(np.asarray(box.vertices), np.asarray(box.faces))
+    asked = _prepare_part._Asked("digest", 0, PartSurface(mesh))
+    prepared = []
+    for kept in (False, True, True):
+        with use_part_store(kept):
+            prepared.append(_prepare_part._prepare(asked))
+    assert len(list(folder.glob("align-*.npz"))) == 1
+    without, cold, warm = (
+        [a.tobytes() for a in (p.grid.plane, p.grid.distance, p.pairs.points.points, p.pairs.i, p.pairs.j, p.pairs.key)]
+        for p in prepared
+    )
+    assert without == cold == warm

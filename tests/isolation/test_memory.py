@@ -125,7 +125,7 @@ for make in [globals()[name] for name in sys.argv[1:]]:
     foreseen.clear()
     del call
 """
-SOME = ("solve", "measure_points", "spread", "wear")
+SOME = ("measure_points",)
 WHAT = (
     "solve", "refine", "skin", "measure_points", "measure_triangles", "measure_cells", "neighbours", "nearest", "fits",
     "density", "spread", "thin", "wear", "cells",

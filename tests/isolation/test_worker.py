@@ -150,7 +150,7 @@ def test_the_error_names_what_was_at_work(function: Callable[..., Any], what: st
 
 
 def test_what_is_noted_has_a_time_limit_of_its_own() -> None:
-    assert call(faults.wait_at_work, seconds=0.7, limit=1.5, steps=3) == 3, "each by itself"
+    assert call(faults.wait_at_work, seconds=0.4, limit=1.0, steps=3) == 3, "each by itself"
     with pytest.raises(ProcessError, match=r"not finished after 0\.5 s, the time limit of a stage") as caught:
         call(faults.wait_at_work, seconds=60, limit=0.5)
     assert (caught.value.why, find_place(caught.value)) == ("time", "waiting")
@@ -160,9 +160,9 @@ def test_a_limit_of_processor_time_counts_no_waiting() -> None:
     def measure(function: Callable[..., Any], **arguments: Any) -> Any:
         return call_isolated(function, arguments, worker="tests", processor_time=True)
 
-    assert measure(faults.wait_at_work, seconds=1.5, limit=0.5) == 1
+    assert measure(faults.wait_at_work, seconds=0.8, limit=0.3) == 1
     with pytest.raises(ProcessError) as caught:
-        measure(faults.work_at_work, limit=0.5)
+        measure(faults.work_at_work, limit=0.3)
     assert find_place(caught.value) == "working"
     with pytest.raises(ProcessError) as caught:  # but what waits for ever is ended too
         measure(faults.wait_at_work, seconds=60, limit=0.05)

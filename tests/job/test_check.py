@@ -157,7 +157,7 @@ def test_written_job_gives_the_same_job(job_file: JobFile, registry: Registry, t
     assert second.tolerance == first.tolerance
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(st.text(alphabet=st.characters(codec="utf-8"), max_size=60))
 def test_any_text_gives_a_job_error_and_nothing_else(text: str) -> None:
     with contextlib.suppress(JobError):
@@ -172,7 +172,7 @@ _VALUES = st.recursive(
 )
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=60, deadline=None)
 @given(tree=st.dictionaries(st.sampled_from(["version", "part", "scan", "cluster", "method"]), _VALUES, max_size=5))
 def test_any_mapping_is_sound_or_a_job_error(tree: dict[str, object], registry: Registry) -> None:
     with contextlib.suppress(JobError):

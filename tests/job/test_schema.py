@@ -8,14 +8,13 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-import jsonschema
 import pytest
 
 from damageest.job import yamlfile
 from damageest.job.schema import job_schema
 from damageest.output.result_json import result_schema
 from damageest.registry import Registry
-from tests.needs import PLUGINS, needs_plugin
+from tests.needs import PLUGINS, import_or_skip, needs_plugin
 
 ROOT = Path(__file__).parents[2]
 
@@ -47,6 +46,7 @@ def test_result_schema_is_current() -> None:
 
 @pytest.mark.parametrize("path", sorted((ROOT / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_example_jobs_fit_the_schema(path: Path) -> None:
+    jsonschema = import_or_skip("jsonschema")
     jsonschema.Draft202012Validator(committed("job")).validate(yamlfile.read(path)[0])
 
 
@@ -63,6 +63,7 @@ def test_example_jobs_fit_the_schema(path: Path) -> None:
     ],
 )
 def test_the_schema_refuses_what_the_code_refuses(change: dict[str, Any]) -> None:
+    jsonschema = import_or_skip("jsonschema")
     job = {"version": 1, "part": "a.stl", "scan": "b.ply", **change}
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.Draft202012Validator(committed("job")).validate(job)

@@ -10,8 +10,13 @@ import pytest
 import trimesh
 
 import damageest
-from damageest.artefacts import Floats, Part, Scan
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Scan
+from damageest.pipeline.datums import note_datums
+from damageest.pipeline.state import JobState
+from damageest.registry import Registry
 from damageest.result import Result
+from damageest.stages.align.icp import Icp
+from tests.pipeline.halfway import run_until
 
 SIZE, NOISE, TOLERANCE = np.array([60.0, 30.0, 20.0]), 0.04, 0.16
 CORNERS = np.array(list(product([-30, 0], [-15, 15], [-10, 10])), float)
@@ -44,32 +49,69 @@ def draw(count: int) -> Floats:
     return np.asarray(points)
 
 
+def add_noise(points: Floats) -> Floats:
+    return points + np.random.default_rng(0).normal(scale=NOISE, size=points.shape)
+
+
+def run_until_adapted(points: Floats, registry: Registry, datum: Any, adapt: str) -> JobState:
+    """What is known after the notes on datums."""
+    align = {"use": "icp", "datum": datum}
+    scan = Scan(add_noise(points))
+    return run_until(
+        "settle_tolerance", make_part(), scan, registry, tolerance=TOLERANCE, align=align, adapt=adapt
+    ).state
+
+
 def run(points: Floats, view: Any = None, **job: Any) -> Result:
-    noisy = points + np.random.default_rng(0).normal(scale=NOISE, size=points.shape)
-    scan = Scan(noisy, viewpoints=None if view is None else np.array([[-200.0, 0, 50], [200, 0, 50]]), view=view)
+    scan = Scan(
+        add_noise(points), viewpoints=None if view is None else np.array([[-200.0, 0, 50], [200, 0, 50]]), view=view
+    )
     return damageest.run({"version": 1, "tolerance": TOLERANCE, "report": "none", **job}, part=make_part(), scan=scan)
 
 
-def measure_off(result: Result) -> float:
+def measure_off(pose: Pose) -> float:
     """How far the end with the datums lies from its place."""
-    T = result.pose.T_part_scan
+    T = pose.T_part_scan
     return float(np.linalg.norm(CORNERS @ T[:3, :3].T + T[:3, 3] - CORNERS, axis=1).max())
 
 
-@pytest.mark.parametrize(
-    "datum",
-    [DATUMS, pytest.param([one for items in DATUMS.values() for one in items], marks=pytest.mark.slow)],
-    ids=["system", "list"],
-)
-def test_an_adapted_part_that_moves_the_pose_off_its_datums_is_named(datum: Any) -> None:
-    points = draw(8000)
+def draw_bent() -> Floats:
+    """Its end without datums is bent."""
+    points = draw(3000)
     points[:, 2] += 0.0006 * np.maximum(points[:, 0], 0) ** 2
-    moved = run(points, align={"use": "icp", "datum": datum}, adapt="smooth")
+    return points
+
+
+LIST = [one for items in DATUMS.values() for one in items]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("datum", [DATUMS, LIST], ids=["system", "list"])
+def test_an_adapted_part_that_moves_the_pose_off_its_datums_is_named(datum: Any, registry: Registry) -> None:
+    moved = run_until_adapted(draw_bent(), registry, datum, "smooth")
     (note,) = [note for note in moved.warnings if note.code == "datum_moved"]
     assert note.amount is not None
-    assert note.amount >= measure_off(moved) > TOLERANCE / 4
-    held = run(points, align={"use": "icp", "datum": datum}, adapt="none")
-    assert measure_off(held) < NOISE / 2
+    assert note.amount >= measure_off(moved.pose) > TOLERANCE / 4
+
+
+@pytest.mark.parametrize(("shift", "is_told"), [(0.02, True), (0.01, False)])
+def test_an_adapted_part_that_takes_the_datums_along_is_told(shift: float, is_told: bool) -> None:
+    """Where it moves them by more than a tenth of the tolerance, 0.16, and the job names datums."""
+    part, motion = make_part(), np.eye(4)
+    motion[2, 3] = shift
+    rest = np.zeros(part.vertices.shape)
+    adapted = AdaptedPart(part, rest, motion, np.zeros((2, *rest.shape)), 0.3, 0.1, 0.01, 0.01, (4, 3, 2))
+    for datum in (DATUMS, LIST, None):
+        aligner = Icp.model_validate({"datum": datum} if datum else {})
+        notes = note_datums.function(adapted, aligner, part, TOLERANCE, "mm")
+        assert [note.code for note in notes] == ["datum_moved"] * (is_told and datum is not None)
+        assert all(note.amount == pytest.approx(shift) for note in notes)
+
+
+@pytest.mark.parametrize("datum", [DATUMS, LIST], ids=["system", "list"])
+def test_a_part_as_designed_keeps_its_datums(datum: Any, registry: Registry) -> None:
+    held = run_until_adapted(draw_bent(), registry, datum, "none")
+    assert measure_off(held.pose) < NOISE / 2
     assert "datum_moved" not in [note.code for note in held.warnings]
 
 

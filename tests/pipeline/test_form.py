@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +77,6 @@ def test_a_scale_is_corrected_on_request(tmp_path: Path) -> None:
     assert T[:3, :3] @ T[:3, :3].T == pytest.approx(np.eye(3), abs=1e-9)
 
 
-def test_another_value_of_scale_is_refused(tmp_path: Path) -> None:
+def test_another_value_of_scale_is_refused(job_file: Callable[..., Path]) -> None:
     with pytest.raises(DamageestError, match=r"scale"):
-        damageest.run(make_scaled(tmp_path, 1.0), settings=["scan.scale=1.01"])
+        damageest.run(job_file(), settings=["scan.scale=1.01"])

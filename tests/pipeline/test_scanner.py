@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ from damageest.artefacts import Floats, Part, Scan
 from damageest.cli import app
 from damageest.findings import Budget, BudgetRow
 from damageest.geometry.solids import to_manifold, to_solid
+from damageest.registry import Registry
 from damageest.result import Result, Site
 from tests import damaged_box
+from tests.pipeline.halfway import Halfway, run_until
 
-NOISE = 0.01
+NOISE, TOLERANCE = 0.01, 0.25
 CERTIFICATE = {
     "probing_form": 0.08,
     "probing_size": 0.02,
@@ -46,19 +49,40 @@ def sample_damaged() -> tuple[Floats, Floats]:
     metal = to_solid(to_manifold(make_box()) - to_manifold(tool))
     assert metal is not None
     mesh = trimesh.Trimesh(metal.vertices, metal.faces, process=False)
-    points, face = trimesh.sample.sample_surface(mesh, 12_000, seed=1)
+    points, face = trimesh.sample.sample_surface(mesh, 6000, seed=1)
     return np.asarray(points), np.asarray(mesh.face_normals[face])
 
 
-@cache
-def run(align: str, offset: float = 0.0, scale: float = 1.0, more: str = "{}", noise: float = NOISE) -> Result:
-    """A run on points that lie outside by ``offset``, scaled about the middle of the part."""
+def make_scan(offset: float = 0.0, scale: float = 1.0, noise: float = NOISE) -> Scan:
+    """Points that lie outside by ``offset``, scaled about the middle of the part."""
     points, normals = sample_damaged()
     points = scale * (points + offset * normals)
-    points = points + np.random.default_rng(0).normal(scale=noise, size=points.shape)
+    return Scan(points + np.random.default_rng(0).normal(scale=noise, size=points.shape))
+
+
+@cache
+def run(align: str, offset: float = 0.0, scale: float = 1.0, more: str = "{}") -> Result:
     aligned = {"use": "icp", "datum": DATUMS} if align == "datums" else align
-    job = {"version": 1, "tolerance": 0.1, "report": "none", "align": aligned, "adapt": "none", **json.loads(more)}
-    return damageest.run(job, part=make_box(), scan=Scan(points))
+    job = {
+        "version": 1,
+        "tolerance": TOLERANCE,
+        "report": "none",
+        "align": aligned,
+        "adapt": "none",
+        **json.loads(more),
+    }
+    return damageest.run(job, part=make_box(), scan=make_scan(offset, scale))
+
+
+def run_until_weighed(registry: Registry, scale: float = 1.0, step: str = "weigh_scanner", **more: Any) -> Halfway:
+    job = {"tolerance": TOLERANCE, "align": "none", "adapt": "none", **more}
+    return run_until(step, make_box(), make_scan(scale=scale), registry, **job)
+
+
+@pytest.fixture(scope="module")
+def plain(registry: Registry) -> Halfway:
+    """Before what is known of the scanner is weighed. The part is at 20 degrees: its temperature changes nothing."""
+    return run_until_weighed(registry)
 
 
 def find_row(budget: Budget | None, source: str) -> BudgetRow:
@@ -76,17 +100,18 @@ DATUMS = [
 @pytest.mark.parametrize(
     ("align", "source", "offset", "scale"),
     [
-        pytest.param("none", "probing_size", 0.03, 1.0, marks=pytest.mark.slow),
+        ("none", "probing_size", 0.03, 1.0),
         pytest.param("icp", "probing_size", 0.03, 1.0, marks=pytest.mark.slow),
-        ("icp", "length", 0.0, 1.005),
-        ("datums", "probing_size", 0.02, 1.0),
+        pytest.param("icp", "length", 0.0, 1.005, marks=pytest.mark.slow),
+        pytest.param("datums", "probing_size", 0.02, 1.0, marks=pytest.mark.slow),
     ],
 )
 def test_a_sensitivity_is_what_a_scan_with_that_error_shows(
-    align: str, source: str, offset: float, scale: float
+    align: str, source: str, offset: float, scale: float, plain: Halfway
 ) -> None:
     given = json.dumps(GIVEN)
-    before, after = run(align, more=given), run(align, offset, scale, given)
+    before = plain.finish(**GIVEN) if align == "none" else run(align, more=given)
+    after = run(align, offset, scale, given)
     size = 2 * offset if offset else scale - 1
     expected = find_row(before.budget, source).sensitivity * size
     assert after.damage_volume - before.damage_volume == pytest.approx(expected, abs=0.45)
@@ -104,35 +129,39 @@ def find_depth(site: Site) -> float:
     return site.depth_95[0] + site.uncertainty.depth_budget.expanded
 
 
-def test_a_warm_part_is_brought_to_20_degrees_and_a_wrong_scale_is_named() -> None:
+def test_a_warm_part_is_brought_to_20_degrees(plain: Halfway) -> None:
     scale = 1 + WARM["expansion"] * (WARM["part"] - 20)
-    right = run("none").damage_volume
+    right = plain.finish().damage_volume
     warm = run("none", scale=scale, more=json.dumps({"temperature": WARM}))
     assert warm.damage_volume == pytest.approx(right, abs=0.05)
     assert warm.scan.points == pytest.approx(sample_damaged()[0], abs=6 * NOISE)
     assert {row.source for row in warm.budget.rows} >= {"temperature", "expansion"}  # type: ignore[union-attr]
-    cold = run("none", scale=1.004, more=json.dumps({"scanner": {"certificate": {"length": 0.005, "k": 2}}}))
-    (note,) = [note for note in cold.warnings if note.code == "certificate"]
+
+
+def test_a_wrong_scale_is_named(registry: Registry) -> None:
+    told = {"certificate": {"length": 0.005, "k": 2}}
+    cold = run_until_weighed(registry, 1.004, "measure_uncertainty", scanner=told)
+    (note,) = [note for note in cold.state.warnings if note.code == "certificate"]
     assert note.amount == pytest.approx(0.4, abs=0.05)
 
 
-def test_what_the_job_does_not_tell_is_named() -> None:
-    assert len(run("none").not_in_budget) == 4
-    assert run("none", more=json.dumps(GIVEN)).not_in_budget == ()
-    some = run("none", more=json.dumps({"scanner": {"certificate": {"probing_size": 0.02}}}))
+def test_what_the_job_does_not_tell_is_named(plain: Halfway) -> None:
+    assert len(plain.finish().not_in_budget) == 4
+    assert plain.finish(**GIVEN).not_in_budget == ()
+    some = plain.finish(scanner={"certificate": {"probing_size": 0.02}})
     assert "probing size error" not in some.not_in_budget
     assert "probing form error" in some.not_in_budget
 
 
-def test_noise_far_above_the_probing_form_error_contradicts_the_certificate() -> None:
-    fine = json.dumps({"scanner": {"certificate": {"probing_form": 0.02}}})
-    assert [note.code for note in run("none", more=fine).warnings if note.code == "certificate"] == ["certificate"]
-    assert not [note for note in run("none", more=json.dumps(GIVEN)).warnings if note.code == "certificate"]
+def test_noise_far_above_the_probing_form_error_contradicts_the_certificate(plain: Halfway) -> None:
+    fine = plain.finish(scanner={"certificate": {"probing_form": 0.02}})
+    assert [note.code for note in fine.warnings if note.code == "certificate"] == ["certificate"]
+    assert not [note for note in plain.finish(**GIVEN).warnings if note.code == "certificate"]
 
 
-def test_a_certificate_widens_the_interval_and_the_interval_is_twice_the_budget() -> None:
-    plain, certified = run("none"), run("none", more=json.dumps(GIVEN))
-    for result in (plain, certified):
+def test_a_certificate_widens_the_interval_and_the_interval_is_twice_the_budget(plain: Halfway) -> None:
+    alone, certified = plain.finish(), plain.finish(**GIVEN)
+    for result in (alone, certified):
         assert result.budget is not None
         assert result.volume_95 is not None
         low, high = result.volume_95
@@ -142,30 +171,34 @@ def test_a_certificate_widens_the_interval_and_the_interval_is_twice_the_budget(
         assert (low, high) == pytest.approx(
             (middle - result.budget.expanded + down, middle + result.budget.expanded + up)
         )
-    assert certified.budget.expanded > plain.budget.expanded  # type: ignore[union-attr]
+    assert certified.budget.expanded > alone.budget.expanded  # type: ignore[union-attr]
 
 
-def test_result_json_the_table_and_the_report_have_the_budget(tmp_path: Path) -> None:
-    text = (
-        damaged_box.JOB.replace("report: none\n", "")
-        + "scanner:\n  certificate: {probing_form: 0.2, length: 0.01 + L/5000}\n"
-    )
-    path = damaged_box.write_small(tmp_path)
-    path.write_text(text.replace("tolerance: 0.2", "tolerance: 0.4"))
-    done = CliRunner().invoke(app, ["run", str(path), "--output", str(tmp_path / "out")])
+CERTIFIED = "scanner:\n  certificate: {probing_form: 0.2, length: 0.01 + L/5000}\n"
+
+
+def test_result_json_and_the_table_have_the_budget(small_done: Path) -> None:
+    small_done.write_text(small_done.read_text() + CERTIFIED)
+    done = CliRunner().invoke(app, ["run", str(small_done)])
     assert done.exit_code == 0, done.output
     assert "not known, and in no interval: probing size error, temperature of the part" in done.output
-    told = json.loads((tmp_path / "out" / "result.json").read_text())
+    told = json.loads((small_done.parent / "out/job/result.json").read_text())
     assert told["budget"]["expanded"] == pytest.approx(2 * told["budget"]["combined"])
     assert told["sites"][0]["uncertainty"]["depth_budget"]["rows"]
     assert {"probing_form", "length"} <= {row["source"] for row in told["budget"]["rows"]}
-    page = (tmp_path / "out" / "report.html").read_text()
+
+
+@pytest.mark.slow
+def test_the_report_has_the_budget(small_done: Path, registry: Registry) -> None:
+    small_done.write_text(small_done.read_text().replace("report: none\n", "") + CERTIFIED)
+    damageest.run(small_done, output=True, registry=registry)
+    page = (small_done.parent / "out/job/report.html").read_text()
     assert "length measurement error" in page
     assert "probing size error, temperature of the part" in page
 
 
 def test_a_wrong_formula_is_a_fault_of_its_line(tmp_path: Path) -> None:
-    path = damaged_box.write_small(tmp_path, "scanner:\n  certificate:\n    length: 0.02 - L/3\n")
+    path = damaged_box.write(tmp_path, damaged_box.JOB + "scanner:\n  certificate:\n    length: 0.02 - L/3\n", 60)
     done = CliRunner().invoke(app, ["validate", str(path)])
     assert done.exit_code == 2
     assert "job.yaml:9" in done.output

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import damageest
-from damageest.artefacts import ADDED, Floats
+from damageest.artefacts import ADDED, Floats, Scan
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.solids import iou, to_solid
+from damageest.registry import Registry
 from damageest.result import Result
+from tests.pipeline.halfway import run_until
 from tests.surplus_scenes import TOLERANCE, ball, block, part, scan, slab, table
 
 
@@ -21,6 +23,7 @@ def run(points: Floats, **more: Any) -> Result:
     return damageest.run(job, part=part(), scan=points)
 
 
+@pytest.mark.slow
 def test_a_bead_and_a_loss_beside_it_are_both_right() -> None:
     actual = block() - ball(3, -4, 0, 7.5) + slab((8, 10, 2), 3, 0, 6)  # 0.4 apart
     result = run(np.concatenate([scan(actual), table()]))
@@ -40,6 +43,7 @@ def test_a_bead_and_a_loss_beside_it_are_both_right() -> None:
     assert [s.stage for s in result.stages].count("cluster") == 1
 
 
+@pytest.mark.slow
 def test_a_loss_under_a_bead_is_right_where_it_is_seen_and_named() -> None:
     actual = block() - ball(4, 0, 0, 6) + slab((6, 10, 4), 3, 0, 6)
     result = run(scan(actual))
@@ -49,15 +53,30 @@ def test_a_loss_under_a_bead_is_right_where_it_is_seen_and_named() -> None:
     assert "covered" in [reason.code for reason in site.verdict.reasons]
 
 
+def test_a_bead_is_right_and_no_loss(registry: Registry) -> None:
+    actual = block() + slab((8, 10, 2), 3, 0, 6)
+    points = Scan(scan(actual, 12_000))
+    job = {"tolerance": 0.2, "align": "none", "adapt": "none", "method": "implicit"}
+    state = run_until("fit_model", part(), points, registry, **job).state
+    assert state.sites.count == 0
+    (bead,) = state.surplus
+    assert bead.solid is not None
+    assert iou(to_solid(actual - block()), bead.solid) > 0.9
+    assert signed_distance(bead.solid.vertices, part())[0].min() > -1e-6
+    assert abs(bead.area - 80) < 8
+    assert (state.deviation.label[bead.points] == ADDED).all()
+
+
 def test_without_added_metal_there_is_no_surplus() -> None:
-    assert run(scan(block() - ball(3, 0, 0, 7))).surplus == ()
+    assert run(scan(block() - ball(3, 0, 0, 7), 5000)).surplus == ()
 
 
 def test_surplus_over_most_of_the_skin_is_another_pose_or_part() -> None:
     with pytest.raises(StageError, match="does not lie on the part"):
-        run(scan(slab((24, 18, 13), 0, 0, 0) + slab((12, 19, 13), 0, 0, 0)))
+        run(scan(slab((24, 18, 13), 0, 0, 0) + slab((12, 19, 13), 0, 0, 0), 5000), adapt="none")
 
 
+@pytest.mark.slow
 def test_tape_and_powder_on_intact_skin_leave_the_volume_right() -> None:
     damaged = block() - ball(4, -6, 0, 7)
     tape = slab((6, 18, 0.4), 6, 0, 6.2)  # over the edges, 2 to 3 tolerances thick

@@ -6,10 +6,11 @@ import os
 import shutil
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from damageest.artefacts import Pose
-from damageest.errors import JobError
+from damageest.errors import DamageestError, InputError, JobError, StageError
 from damageest.pipeline import workspace
 from damageest.pipeline.workspace import open_workspace
 from tests.pipeline.outputs import files, make
@@ -70,6 +71,25 @@ def test_a_failure_leaves_the_old_and_keeps_finished_stages(tmp_path: Path) -> N
     with open_workspace(target, use_cache=False) as place:
         assert not place.cache.get("align", "later")[0]
         assert not place.cache.get("align", "k")[0]
+
+
+@pytest.mark.parametrize("error", [StageError("refused"), JobError([]), InputError("bad"), OSError(28, "full")])
+@pytest.mark.parametrize("exists", [False, True])
+def test_a_failure_in_a_new_folder_keeps_finished_stages_alone(exists: bool, error: Exception, tmp_path: Path) -> None:
+    target = tmp_path / "new/out"
+    if exists:
+        target.mkdir(parents=True)
+    with pytest.raises((DamageestError, OSError)), open_workspace(target) as place:  # noqa: PT012 - the block fails
+        place.cache.put("align", "k", Pose(np.eye(4)))
+        (place.folder / "damage.stl").write_text("half")
+        raise error
+    assert os.listdir(tmp_path / "new") == ["out"]
+    assert os.listdir(target) == ["stages"]
+    with open_workspace(target) as place:
+        assert place.cache.get("align", "k")[0]
+        (place.folder / "result.json").write_text("{}")
+        place.finish([])
+    assert files(target) == {"result.json": "{}"}
 
 
 def test_a_failure_without_a_finished_stage_leaves_nothing(tmp_path: Path) -> None:

@@ -10,8 +10,6 @@ import pytest
 import damageest
 from damageest.errors import InputError
 from damageest.registry import Registry
-from damageest.result import Result
-from tests import damaged_box
 from tests.registry.test_registry import Site, site  # noqa: F401 - a fixture
 
 COUNTED = """
@@ -24,23 +22,19 @@ def damageest_conversions():
 """
 
 
-def run(folder: Path) -> Result:
-    return damageest.run(damaged_box.write_small(folder, ""))
-
-
-def test_a_plugins_conversion_is_called_with_the_result(site: Site, tmp_path: Path) -> None:  # noqa: F811
+def test_a_plugins_conversion_is_called_with_the_result(site: Site, tiny_done: Path) -> None:  # noqa: F811
     site.add("acme-count", COUNTED.replace("NAME", "'count'"))
-    result = run(tmp_path)
+    result = damageest.run(tiny_done, output=True)
     assert result.convert("count", "damage", 1) == len(result.sites[0].damage.faces)
     with pytest.raises(InputError, match=r"no plugin here converts a result to 'cont'; there are: .*\bcount\b"):
         result.convert("cont", "damage", 1)
 
 
 def test_without_the_package_it_is_named_and_the_result_can_be_pickled(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    tiny_done: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("damageest.registry.loading._list_installed", list)
-    result = pickle.loads(pickle.dumps(run(tmp_path)))
+    result = pickle.loads(pickle.dumps(damageest.run(tiny_done, output=True)))
     with pytest.raises(InputError, match="'cadquery' needs the plugin damageest-cadquery, which is not installed"):
         result.as_cadquery("damage", 1)
 

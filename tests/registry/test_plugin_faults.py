@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 import warnings
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -45,7 +46,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_fault_is_named_and_the_commands_go_on(name: str, site: Site, tmp_path: Path) -> None:
+def test_a_fault_is_named(name: str, site: Site) -> None:
     source, text = FAULTS[name]
     site.add("acme-faulty", source)
     with warnings.catch_warnings():
@@ -54,8 +55,12 @@ def test_a_fault_is_named_and_the_commands_go_on(name: str, site: Site, tmp_path
     (fault,) = [fault for fault in broken if fault.provider.name.startswith("acme")]
     assert str(fault.provider) == "acme-faulty 1.2"
     assert text in fault.reason
-    job = str(damaged_box.write(tmp_path))
-    for words in (["--help"], ["stages"], ["schema", "job"], ["validate", job]):
+
+
+@pytest.mark.parametrize("name", ["hook gives None", "invalid default", "exits on import"])
+def test_the_commands_go_on_beside_a_fault(name: str, site: Site, job_file: Callable[..., Path]) -> None:
+    site.add("acme-faulty", FAULTS[name][0])
+    for words in (["--help"], ["stages"], ["schema", "job"], ["validate", str(job_file())]):
         assert CliRunner().invoke(app, words).exit_code == 0
     assert "acme-faulty" in CliRunner().invoke(app, ["plugins"]).output
 
@@ -67,10 +72,9 @@ def test_one_package_that_provides_a_name_twice(site: Site) -> None:
         registry.get("allowance", "doubled")
 
 
-def test_a_stage_that_prints_leaves_json_alone(site: Site, tmp_path: Path) -> None:
+def test_a_stage_that_prints_leaves_json_alone(site: Site, tiny_done: Path) -> None:
     site.add("acme-loud", GROWN.replace(BODY, f"print('hello'); {BODY}"))
-    job = damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n")
-    done = CliRunner().invoke(app, ["run", "--json", str(job)])
+    done = CliRunner().invoke(app, ["run", "--json", str(tiny_done), "--set", "allowance=doubled"])
     assert json.loads(done.stdout)["status"] == "ok"
     assert "hello" in done.stderr
 
@@ -86,38 +90,52 @@ MISBEHAVIOUR = {
     ),
 }
 FORGETFUL = '''
-from damageest.stages.repair import Repair
+from damageest.stages.cluster import Cluster
 
-class Doubled(Repair):
+class Forgets(Cluster):
     """Forgets to return."""
-    use: Literal["doubled"] = "doubled"
-    def run(self, enclosure):
+    use: Literal["forgets"] = "forgets"
+    def run(self, deviation):
         pass
 
 @hookimpl
 def damageest_stages():
-    return [Doubled]
+    return [Forgets]
+'''
+HANGING = '''
+import time
+from damageest.artefacts import Scan
+from damageest.stages.scan import ReadScan
+
+class Hangs(ReadScan):
+    """Does not end."""
+    use: Literal["hangs"] = "hangs"
+    def run(self, unit: str) -> Scan:
+        open(HUNG, "w").close()
+        time.sleep(600)
+
+@hookimpl
+def damageest_stages():
+    return [Hangs]
 '''
 
 
 @pytest.mark.parametrize("name", MISBEHAVIOUR)
-def test_what_a_stage_does_wrong_is_said_with_whose_it_is(name: str, site: Site, tmp_path: Path) -> None:
+def test_what_a_stage_does_wrong_is_said_with_whose_it_is(name: str, site: Site, tiny_done: Path) -> None:
     body, text = MISBEHAVIOUR[name]
     site.add("acme-bad", GROWN.replace(BODY, body))
-    job = damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n")
-    done = CliRunner().invoke(app, ["run", str(job)])
+    done = CliRunner().invoke(app, ["run", str(tiny_done), "--set", "allowance=doubled"])
     assert done.exit_code == 1
     told = " ".join(done.output.split())
     assert f"allowance: doubled (site 1): {text}" in told
     assert "acme-bad 1.2" in told or name.startswith("lacks")
 
 
-def test_none_where_the_contract_has_none(site: Site, tmp_path: Path) -> None:
+def test_none_where_the_contract_has_none(site: Site, tiny_done: Path) -> None:
     site.add("acme-none", FORGETFUL)
-    job = damaged_box.write(tmp_path, damaged_box.JOB + "repair: doubled\n")
-    done = CliRunner().invoke(app, ["run", str(job)])
+    done = CliRunner().invoke(app, ["run", str(tiny_done), "--set", "cluster=forgets"])
     assert done.exit_code == 1
-    assert "gave a NoneType where its contract promises Solid" in " ".join(done.output.split())
+    assert "gave a NoneType where its contract promises Sites" in " ".join(done.output.split())
 
 
 def test_a_module_without_hooks_provides_nothing(site: Site) -> None:
@@ -126,19 +144,20 @@ def test_a_module_without_hooks_provides_nothing(site: Site) -> None:
     assert "acme-empty 1.2  MIT  no stages" in CliRunner().invoke(app, ["plugins"]).output
 
 
-@pytest.mark.parametrize(
-    ("number", "status"), [(signal.SIGINT, 130), pytest.param(signal.SIGTERM, -signal.SIGTERM, marks=pytest.mark.slow)]
-)
-def test_a_stage_that_hangs_can_be_stopped(number: int, status: int, site: Site, tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path / "job")
-    command = [sys.executable, "-c", "from damageest.cli import main; main()", "run", "-q", str(job)]
-    subprocess.run(command, check=True)
-    before = damaged_box.content(tmp_path / "job" / "out" / "job")
+@pytest.mark.slow
+@pytest.mark.parametrize(("number", "status"), [(signal.SIGINT, 130), (signal.SIGTERM, -signal.SIGTERM)])
+def test_a_stage_that_hangs_can_be_stopped(
+    number: int, status: int, site: Site, tiny_done: Path, tmp_path: Path
+) -> None:
+    out = tiny_done.parent / "out" / "job"
+    before = damaged_box.content(out)
     assert before
     hung = tmp_path / "hung"
-    site.add("acme-hang", GROWN.replace(BODY, f"import time; open({str(hung)!r}, 'w').close(); time.sleep(600)"))
+    site.add("acme-hang", HANGING.replace("HUNG", repr(str(hung))))
+    text = tiny_done.read_text()
+    tiny_done.write_text(text.replace("scan: scan.ply", "scan: {use: hangs}"))
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(site.folder), os.environ.get("PYTHONPATH", "")])}
-    stuck = [*command, "--set", "allowance=doubled"]
+    stuck = [sys.executable, "-c", "from damageest.cli import main; main()", "run", "-q", str(tiny_done)]
 
     def allow_interrupts() -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells let what runs in the background ignore it
@@ -154,8 +173,9 @@ def test_a_stage_that_hangs_can_be_stopped(number: int, status: int, site: Site,
             assert ("the same command continues" in said) == (number == signal.SIGINT)
         finally:
             process.kill()
-    assert damaged_box.content(tmp_path / "job" / "out" / "job") == before
-    subprocess.run(command, check=True)
+    assert damaged_box.content(out) == before
+    tiny_done.write_text(text)
+    assert damageest.run(tiny_done, output=True).status == "ok"
 
 
 STOPPED = """
@@ -165,7 +185,7 @@ stopped.__cause__ = KeyboardInterrupt()
 
 
 @pytest.mark.parametrize("place", ["import", "hook", "run"])
-def test_an_interrupted_import_is_no_fault_of_the_plugin(place: str, site: Site, tmp_path: Path) -> None:
+def test_an_interrupted_import_is_no_fault_of_the_plugin(place: str, site: Site, tiny_done: Path) -> None:
     """A compiled module raises ImportError where Ctrl-C stops its import."""
     source = {
         "import": STOPPED + "raise stopped",
@@ -173,8 +193,10 @@ def test_an_interrupted_import_is_no_fault_of_the_plugin(place: str, site: Site,
         "run": STOPPED + GROWN.replace(BODY, "raise stopped"),
     }[place]
     site.add("acme-stopped", source)
+    before = damaged_box.content(tiny_done.parent / "out")
     with pytest.raises(KeyboardInterrupt):
-        damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "allowance: doubled\n"))
+        damageest.run(tiny_done, settings=["allowance=doubled"], output=True)
+    assert damaged_box.content(tiny_done.parent / "out") == before
 
 
 def test_a_plugin_that_lacks_a_library_is_broken_with_a_remedy(site: Site) -> None:

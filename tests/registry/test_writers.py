@@ -28,12 +28,13 @@ def damageest_writers():
 """
 
 
-def test_a_plugins_format_is_written_listed_and_cleared_away(site: Site, tmp_path: Path) -> None:  # noqa: F811
+def test_a_plugins_format_is_written_listed_and_cleared_away(site: Site, tiny_done: Path) -> None:  # noqa: F811
     site.add("acme-count", COUNTED.replace("NAME", "'count'"))
-    path = damaged_box.write(tmp_path, damaged_box.JOB + "export: {format: [count, stl], frame: both}\n")
+    text = tiny_done.read_text()
+    tiny_done.write_text(text + "export: {format: [count, stl], frame: both}\n")
     assert Registry.discover().formats["count"].name == "acme-count"
-    damageest.run(path, output=True)
-    out = tmp_path / "out/job"
+    damageest.run(tiny_done, output=True)
+    out = tiny_done.parent / "out/job"
     faces = (out / "damage/site-1.count").read_text()
     assert faces.startswith("damage site-1: ")
     assert faces.endswith(" mm\n")
@@ -41,7 +42,7 @@ def test_a_plugins_format_is_written_listed_and_cleared_away(site: Site, tmp_pat
     assert "scan_frame/undamaged.count" in said["files"]
     assert set(said["notes"]) == {"counted only"}
     (out / "mine.count").write_text("mine")
-    damageest.run(path, output=True, settings=["export.format=stl", "export.frame=part"])
+    damageest.run(tiny_done, output=True, settings=["export.format=stl", "export.frame=part"])
     left = {str(p.relative_to(out)) for p in out.rglob("*") if p.is_file() and "stages" not in p.parts}
     assert {name for name in left if name.endswith(".count")} == {"mine.count"}
     assert not (out / "scan_frame").exists()

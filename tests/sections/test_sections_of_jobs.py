@@ -30,7 +30,9 @@ sections:
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("sections")
-    job = damaged_box.write(folder, damaged_box.JOB.replace("report: none\n", "") + SECTIONS, 8000)
+    job = damaged_box.write(
+        folder, damaged_box.JOB.replace("report: none\n", "").replace("0.2", "0.4") + SECTIONS, 6000
+    )
     damageest.run(job, output=folder / "out")
     return folder / "out"
 
@@ -78,7 +80,7 @@ def test_a_job_as_it_ran_asks_for_the_same_sections(ran: Path) -> None:
     ],
 )
 def test_what_a_section_cannot_be_is_a_fault_of_the_job(asked: str, said: str, tmp_path: Path) -> None:
-    job = damaged_box.write_small(tmp_path, f"sections: [{asked}]\n")
+    job = damaged_box.write(tmp_path, damaged_box.JOB + f"sections: [{asked}]\n", 60)
     with pytest.raises(JobError) as error:
         load(job, Registry.discover())
     assert said in str(error.value)

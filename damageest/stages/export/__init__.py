@@ -197,16 +197,23 @@ class PathSettings:
     machine: Path | str | None = None
 
 
+CheckFunction = Callable[[PathSettings, Sequence[str]], None]
+"""A function of ``settings, channels`` that raises StageError, or JobError for a file, where no path could be written
+with these settings; ``channels``: the names of those that the paths will have. It imports no more than it needs."""
+
+
 @dataclass(frozen=True)
 class PathWriter:
     """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the
     path in the frame asked for, or in its set-up frame where it has one (`DepositPath.setup` then takes points of the
     frame asked for to it), and a `PathSettings`; the same path gives the same bytes. It gives notes, of which the user
     is told at the end of the run, or None, and raises StageError for a path that the format cannot hold or the machine
-    cannot run: then there is no file. ``suffix``: of the file, without the dot."""
+    cannot run: then there is no file. ``suffix``: of the file, without the dot. ``check``: called before anything is
+    computed; None for none."""
 
     write: Callable[[Path, DepositPath, PathSettings], Sequence[str] | None]
     suffix: str
+    check: CheckFunction | None = None
 
 
 def describe_setup(path: DepositPath, factor: float = 1.0) -> list[str]:

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import AfterValidator, Field
@@ -18,11 +18,12 @@ from damageest.geometry.touching import ROUNDS, separate_touching
 from damageest.geometry.transforms import invert_pose, move_mesh, move_points
 from damageest.io.meshes import write_ply
 from damageest.stages import JobPath
-from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathWriter, Writer
+from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathSettings, PathWriter, Writer
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, DOUBTFUL, MILLED, SURPLUS, UNDAMAGED
 from damageest.stages.export._coverage import write_coverage
 from damageest.stages.export._nominal import map_to_nominal
 from damageest.stages.export._options import Formats, MachineFile, PathFormats, PathOption, check_spline_writer
+from damageest.stages.export._path_checks import check_paths
 from damageest.stages.export._paths import write_paths
 from damageest.stages.export._scan_points import PointColours, write_scan
 
@@ -100,6 +101,12 @@ class Files(Export):
         description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54), "
         "rotary (AC, BC, none, auto), tcp (control, machine, table), tcpm_on, tcpm_off (G43.4 H1, G49), pivot",
     )
+
+    def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
+        """What the writers of paths cannot do, where the job plans some or names a machine."""
+        settings = PathSettings("mm", "check", options=self.path_options, machine=self.machine)
+        templates = {"path_header": self.path_header, "path_footer": self.path_footer}
+        return check_paths(self.paths, settings, templates, job.get("path"), registry.path_writers)
 
     def run(
         self,

@@ -3,6 +3,7 @@ the machine's kinematics, or of the program itself."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from string import Template
 
@@ -58,6 +59,13 @@ def write_rs274(file: Path, path: DepositPath, settings: PathSettings) -> None:
     lines += [options["tcpm_off"]] if calls_control else []
     lines += _fill_in(FOOTER if settings.footer is None else settings.footer, words)
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def check_rs274(settings: PathSettings, channels: Sequence[str]) -> None:
+    """Raises StageError for options that no path could be written with."""
+    options = _check_options(settings)
+    if options["tcp"] == "table":
+        _read_pivot(options["pivot"])
 
 
 def _write_moves(

@@ -65,6 +65,11 @@ class Path(Stage, ABC):
         self, body: Solid, part: Part, left: Solid | None, built: Solid | None, tolerance: float
     ) -> DepositPath | None: ...
 
+    def list_channels(self) -> tuple[str, ...]:
+        """The names of the channels of the process that its paths have, as far as the options say; see
+        `DepositPath.channels`."""
+        return ()
+
     def rank_site(self, number: int) -> int:
         """The place of a site, by its number, in the order in which the sites are built up; those of one rank follow
         each other by their numbers."""

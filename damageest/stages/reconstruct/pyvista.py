@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -22,6 +22,7 @@ class PyVista(Reconstruct):
     The points are first moved onto local fits, because VTK's tangent planes follow the noise of the points.
     """
 
+    modules: ClassVar[tuple[str, ...]] = ("pyvista",)
     use: Literal["pyvista"] = "pyvista"
     neighbours: int = Field(
         20, ge=5, le=200, description="points of each tangent plane; at most half of the site's points"

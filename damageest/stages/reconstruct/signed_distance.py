@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -19,6 +19,7 @@ class SignedDistance(Reconstruct):
     planes of nearby points.
     """
 
+    modules: ClassVar[tuple[str, ...]] = ("pyvista",)
     use: Literal["signed_distance"] = "signed_distance"
     spacing: float | None = Field(
         None,

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
+from damageest.errors import describe_install
 from damageest.stages import JobPath
 from damageest.stages.report import Report, ReportFiles
 
@@ -30,9 +31,7 @@ class Html(Report):
     triangles: int = Field(
         120_000, ge=1000, le=1_000_000, description="about how many triangles the 3D view shows; meshes are simplified"
     )
-    pdf: bool = Field(
-        False, description='whether `report.pdf`, A4, is written too; needs `pip install "damageest[pdf]"`'
-    )
+    pdf: bool = Field(False, description="whether `report.pdf`, A4, is written too; needs the extra `pdf`")
     company: str = Field("", max_length=80, description="name at the head of each page of the PDF")
     logo: JobPath | None = Field(None, description="PNG or JPEG file at the head of each page of the PDF")
     language: str = Field("en", description="language of the PDF: en, de; reasons and notes are English")
@@ -48,9 +47,20 @@ class Html(Report):
 
     @model_validator(mode="after")
     def _check_pdf(self) -> Self:
-        if self.pdf and find_spec("reportlab") is None:
-            raise ValueError('pdf: needs the package reportlab; install it:  pip install "damageest[pdf]"')
+        lacking = [module for module in ("reportlab", "k3d", "PIL") if self.pdf and find_spec(module) is None]
+        if lacking:
+            raise ValueError(f"pdf: needs the package {lacking[0]}; install it:  {describe_install('pdf')}")
         return self
+
+    def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
+        """A logo that is no picture."""
+        if not self.pdf or self.logo is None or not self.logo.is_file():
+            return []
+        with self.logo.open("rb") as stream:
+            start = stream.read(8)
+        if start.startswith((b"\x89PNG\r\n\x1a\n", b"\xff\xd8\xff")):
+            return []
+        return [(("logo",), f"{self.logo} is neither PNG nor JPEG; save it as one of them")]
 
     def run(self, result: Result, folder: Path, content: Mapping[str, Any], job_text: str) -> ReportFiles:
         """Writes ``report.html``, and ``report.pdf`` where it is asked for, into ``folder``."""

@@ -13,6 +13,7 @@ from app_page import Page, mark, open_app, serve
 from app_shop import open_job, read_job, sample, write_plate
 from ruamel.yaml import YAML
 
+from tests.needs import import_or_skip
 from tests.stages.report.browser import open_browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(400)]
@@ -121,7 +122,7 @@ def test_datums_of_a_mesh_are_clicked_together_and_in_order(shop: Path) -> None:
 
 
 def test_datums_of_a_step_file_are_numbers_of_its_faces(shop: Path) -> None:
-    cadquery = pytest.importorskip("cadquery")
+    cadquery = import_or_skip("cadquery")
     write_plate(shop)
     body = cadquery.Workplane("XY").box(40, 30, 12).faces(">Z").workplane().center(-9, 5).circle(5).extrude(6)
     body.val().exportStep(str(shop / "plate.step"))

@@ -11,7 +11,6 @@ from damageest_app import edits
 from damageest_app.faces import Faces
 from damageest_app.folder import Folder, guess_inputs
 from damageest_app.histogram import Histogram
-from damageest_app.inputs import Reader
 from damageest_app.pathview import PathPlay, make_nozzle
 from damageest_app.pick import MeshPicker, Ray, find_point
 from damageest_app.runner import Progress, Runner, describe_end
@@ -21,6 +20,7 @@ from ruamel.yaml import YAML
 from damageest.artefacts import Mesh, Part
 from damageest.geometry.make_part import make_part
 from damageest.registry import Registry
+from tests.needs import import_or_skip
 
 
 @pytest.fixture(scope="module")
@@ -124,10 +124,11 @@ def test_units_that_explain_the_sizes_are_offered(tmp_path: Path, registry: Regi
     body.export(tmp_path / "box.stl")
     np.savetxt(tmp_path / "scan.xyz", body.sample(3000, seed=1) / 25.4)
     values = {"version": 1, "units": "mm", "part": "box.stl", "scan": "scan.xyz"}
-    found = Reader(registry).read(values, tmp_path)
+    inputs = import_or_skip("damageest_app.inputs")
+    found = inputs.Reader(registry).read(values, tmp_path)
     assert found.doubt
     assert found.offers[0] == ("scan", "in")
-    right = Reader(registry).read({**values, "scan": {"path": "scan.xyz", "unit": "in"}}, tmp_path)
+    right = inputs.Reader(registry).read({**values, "scan": {"path": "scan.xyz", "unit": "in"}}, tmp_path)
     assert (right.doubt, right.offers) == ("", ())
 
 

@@ -88,7 +88,7 @@ def test_the_number_of_a_triangles_cad_face_is_right(shape: Any, tmp_path: Path)
 
 def test_a_finer_chord_gives_a_smaller_measured_error_and_a_better_volume(shape: Any, tmp_path: Path) -> None:
     path = write(shape, tmp_path / "a.step")
-    parts = [Brep(path=path, chord=chord).run(unit="mm", tolerance=None) for chord in (0.4, 0.1, 0.02)]
+    parts = [Brep(path=path, chord=chord).run(unit="mm", tolerance=None) for chord in (0.8, 0.2, 0.05)]
     errors = [part.tessellation_error for part in parts]
     wrong = [abs(part.volume - shape.Volume()) for part in parts]
     assert errors[0] > errors[1] > errors[2] > 0
@@ -97,9 +97,9 @@ def test_a_finer_chord_gives_a_smaller_measured_error_and_a_better_volume(shape:
 
 def test_units_of_the_job_and_of_the_option(shape: Any, tmp_path: Path) -> None:
     inch = write(shape, tmp_path / "inch.step", "INCH")
-    in_inches = Brep(path=inch).run(unit="in", tolerance=0.02)
+    in_inches = Brep(path=inch).run(unit="in", tolerance=0.05)
     assert in_inches.volume * 25.4**3 == pytest.approx(shape.Volume(), rel=0.02)
-    told = Brep(path=inch, unit="mm").run(unit="mm", tolerance=0.02)  # the file's numbers, taken for millimetres
+    told = Brep(path=inch, unit="mm").run(unit="mm", tolerance=0.05)  # the file's numbers, taken for millimetres
     assert told.volume == pytest.approx(in_inches.volume, rel=1e-6)
     brep = write(shape, tmp_path / "a.brep")  # carries no unit: the job's
     assert Brep(path=brep).run(unit="in", tolerance=0.4).volume == pytest.approx(shape.Volume(), rel=0.01)
@@ -158,7 +158,10 @@ def test_a_file_cut_short_is_refused(shape: Any, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "extents"),
-    [("featuretype.STEP", (127, 63.5, 34.9)), ("nist_ctc_01_asme1_ap242-e1.stp", (800, 450, 150))],
+    [
+        pytest.param("featuretype.STEP", (127, 63.5, 34.9), marks=pytest.mark.slow),
+        ("nist_ctc_01_asme1_ap242-e1.stp", (800, 450, 150)),
+    ],
 )
 def test_real_files_are_watertight(name: str, extents: tuple[float, ...]) -> None:
     folder = os.environ.get("DAMAGEEST_REAL_DATA")

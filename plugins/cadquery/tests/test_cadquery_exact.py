@@ -13,10 +13,12 @@ import pytest
 from damageest_cadquery import exact
 from damageest_cadquery._assembly import NamedShape, write_assembly
 from damageest_cadquery._read import read
+from damageest_cadquery._request import Made
 from damageest_cadquery._split import measure_volume
 
 import damageest
 from damageest.errors import InputError
+from damageest.isolation import ProcessError
 from damageest.registry import Registry
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
@@ -180,15 +182,34 @@ def test_a_site_that_takes_too_long_gets_facets_and_says_so(
     assert len(solid.Faces()) > 20
 
 
+def test_what_stops_opencascade_is_left_out_at_the_next_start(
+    done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With a process that is not started; the slow tests below start it."""
+    asked, places = [], iter(["shapes for site 1", "site 2"])
+
+    def stop_twice(_: Any, arguments: dict[str, Any], **__: Any) -> Made:
+        asked.append(dict(arguments["request"].skipped))
+        if len(asked) < 3:
+            raise ProcessError("crash", "its process ended by an abort (SIGABRT)")
+        return Made((), (), {})
+
+    monkeypatch.setattr(exact, "call_isolated", stop_twice)
+    monkeypatch.setattr(exact, "find_place", lambda _: next(places))
+    told = exact.write_exact(tmp_path, done.result, {}, {"": None}, 6)
+    why = "OpenCASCADE stopped (its process ended by an abort (SIGABRT))"
+    assert asked == [{}, {"shapes for site 1": why}, {"shapes for site 1": why, "site 2": why}]
+    assert told.exact is not None
+    assert (told.exact[2].form, told.exact[2].tried) == ("none", (why,))
+    assert f"site-2.step has facets, not the faces of the CAD file: {why}" in told.warnings
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "text"),
     [
         (cadquery_faults.abort_at_second, "OpenCASCADE stopped (its process ended by an abort (SIGABRT))"),
-        pytest.param(
-            cadquery_faults.raise_at_second,
-            "OpenCASCADE stopped (RuntimeError: Standard_NoSuchObject)",
-            marks=pytest.mark.slow,
-        ),
+        (cadquery_faults.raise_at_second, "OpenCASCADE stopped (RuntimeError: Standard_NoSuchObject)"),
     ],
     ids=["abort", "raise"],
 )
@@ -203,13 +224,12 @@ def test_a_fault_of_opencascade_costs_only_the_exact_form(
     assert (tmp_path / "out/undamaged.step").is_file()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "text"),
     [
         (cadquery_faults.abort_with_shapes, "shapes 2: OpenCASCADE stopped (its process ended by an abort (SIGABRT))"),
-        pytest.param(
-            cadquery_faults.compute_on_with_shapes, "shapes 2: OpenCASCADE took longer than 2 s", marks=pytest.mark.slow
-        ),
+        (cadquery_faults.compute_on_with_shapes, "shapes 2: OpenCASCADE took longer than 2 s"),
     ],
     ids=["abort", "time"],
 )

@@ -33,9 +33,9 @@ def step(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("unit", ["mm", "in"])
+@pytest.mark.parametrize("unit", [pytest.param("mm", marks=pytest.mark.slow), "in"])
 def test_each_face_is_that_of_its_triangles(step: Path, unit: str) -> None:
-    stage = Brep(path=step, chord=0.002 / (25.4 if unit == "in" else 1), angle=6)
+    stage = Brep(path=step, chord=0.004 / (25.4 if unit == "in" else 1), angle=8)
     part, faces = stage.run(unit=unit, tolerance=None), stage.cad_faces(unit)
     assert part.faces_brep is not None
     assert [face.number for face in faces] == list(range(len(part.face_kinds)))

@@ -25,9 +25,9 @@ SHAPES: dict[str, Callable[[], Any]] = {
     "block with a bore and fillets": lambda: (
         cq.Workplane().box(30, 20, 12).faces(">Z").workplane().hole(6).edges("|Z").fillet(2)
     ),
-    "sphere": lambda: cq.Workplane().sphere(10),
+    "sphere": lambda: cq.Workplane().sphere(6),
     "cone with its tip": lambda: cq.Workplane(obj=cq.Solid.makeCone(10, 0, 20)),
-    "torus": lambda: cq.Workplane(obj=cq.Solid.makeTorus(20, 5)),
+    "torus": lambda: cq.Workplane(obj=cq.Solid.makeTorus(12, 4)),
     "loft": lambda: cq.Workplane().rect(20, 10).workplane(offset=30).circle(6).loft(),
     "spline edge": lambda: (
         cq.Workplane().lineTo(0, 5).spline([(10, 8), (20, 3), (30, 9)], includeCurrent=True).lineTo(30, 0).close()
@@ -60,8 +60,18 @@ def take_solid(shape: Any) -> Any:
     return shape.solids().vals()[0].wrapped
 
 
-@pytest.mark.parametrize("move", [bend, roughen])
-@pytest.mark.parametrize("name", SHAPES)
+DEAR = ("block with a bore and fillets", "sphere", "cone with its tip", "torus", "loft", "crossing bores")
+"""Each takes 1 s and more where it is roughened."""
+
+
+@pytest.mark.parametrize(
+    ("name", "move"),
+    [
+        pytest.param(name, move, marks=[pytest.mark.slow] if move is roughen and name in DEAR else [])
+        for name in SHAPES
+        for move in (bend, roughen)
+    ],
+)
 def test_moved_solids_are_sound_and_follow(name: str, move: Callable[[Floats], Floats]) -> None:
     from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_SHELL, TopAbs_VERTEX
 

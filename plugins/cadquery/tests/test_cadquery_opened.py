@@ -136,11 +136,12 @@ def test_as_cadquery_gives_the_metal_to_mill_off(opened: Run) -> None:
     assert measure_volume(shape.wrapped) == pytest.approx(said["volume"], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "form", "deposit"),
     [
         (cadquery_faults.abort_at_opened, "none", "its opened cavity has facets too"),
-        pytest.param(cadquery_faults.abort_at_milled, "facets", "", marks=pytest.mark.slow),
+        (cadquery_faults.abort_at_milled, "facets", ""),
     ],
     ids=["opened", "milled"],
 )
@@ -188,6 +189,7 @@ def cut_ball(box: Any, radius: float) -> Any:
     return Exact((Piece(solid, 0, origins),), (), "shapes", Measured(measure_volume(solid)), 0.0)
 
 
+@pytest.mark.slow
 def test_a_cavity_that_is_cut_back_is_exact_too(tmp_path: Path) -> None:
     done = run(tmp_path, inner=0.4)
     for site, said in zip(done.result.sites, done.said, strict=True):

@@ -7,7 +7,6 @@ import re
 from pathlib import Path
 from xml.etree import ElementTree
 
-import cadquery as cq
 import numpy as np
 import pytest
 from damageest_cadquery._part21 import Ref, Typed, read_entities
@@ -20,6 +19,10 @@ from damageest.cli import app
 from damageest.io.meshes import write_points
 from damageest.job import yamlfile
 from damageest.stages.part import CadFace
+from tests.needs import import_for, needs_plugin
+
+pytestmark = needs_plugin("cadquery")
+cq = import_for("cadquery", "cadquery")
 
 REAL = Path(os.environ.get("DAMAGEEST_REAL_DATA", "/nowhere"))
 CTC = REAL / "nist_ctc_01_asme1_ap242-e1.stp"

@@ -69,7 +69,7 @@ def take_solids(path: Path) -> list[Any]:
     return solids
 
 
-@pytest.mark.parametrize(("multiplicity", "height"), [(1, 1.0), (3, 0.03)])
+@pytest.mark.parametrize(("multiplicity", "height"), [(1, 1.0), pytest.param(3, 0.03, marks=pytest.mark.slow)])
 def test_stock_on_a_spline_is_a_solid_in_the_file(multiplicity: int, height: float, tmp_path: Path) -> None:
     """OpenCASCADE writes the offset of a surface with a crease, and does not read it: the solid would be lost."""
     from damageest_cadquery._split import measure_volume

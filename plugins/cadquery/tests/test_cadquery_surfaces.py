@@ -217,6 +217,7 @@ def test_the_volume_of_a_twisted_blade_is_that_of_a_fine_mesh() -> None:
     assert measure_volume(blade) == pytest.approx(triangulate(blade, 0.03, 0.2).volume, rel=2e-3)
 
 
+@pytest.mark.slow
 def test_a_picture_shows_faces_inside_in_red_and_others_not(tmp_path: Path) -> None:
     import pyvista as pv
     from damageest_cadquery._assembly import NamedShape, write_assembly

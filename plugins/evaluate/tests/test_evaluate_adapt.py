@@ -14,8 +14,10 @@ from damageest_evaluate.adapting.report import make_adapting_table
 from damageest_evaluate.adapting.suite import GROUPS, SHAPES, USES, make_adapting_cases
 from damageest_evaluate.parts import PARTS
 from evaluate_calls import evaluate
+from typer.testing import CliRunner
 
-from damageest.errors import InputError
+from damageest.cli import app
+from damageest.errors import DamageestError, InputError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.sampling import sample_by_area
 from damageest.stages.scan.deformation import Deformation, deform
@@ -55,9 +57,10 @@ def test_the_table_counts_what_is_right() -> None:
 
 @pytest.mark.parametrize(("words", "said"), [(["--groups", "broken"], "lost end"), (["--use", "smoth"], "plain")])
 def test_a_wrong_name_is_refused(words: list[str], said: str) -> None:
-    done = evaluate("adapt", *words)
-    assert done.returncode == 2
-    assert said in done.stderr
+    with pytest.raises(DamageestError) as caught:
+        CliRunner().invoke(app, ["evaluate", "adapt", *words], catch_exceptions=False)
+    assert caught.value.exit_status == 2
+    assert said in str(caught.value)
 
 
 @pytest.mark.slow

@@ -13,7 +13,9 @@ from damageest_evaluate import case as case_module
 from damageest_evaluate.job import plan_study
 from damageest_evaluate.variants import VariationRequest
 from evaluate_calls import evaluate, rows_of, timeless
+from typer.testing import CliRunner
 
+from damageest.cli import app
 from damageest.errors import DamageestError
 from damageest.registry import Registry
 from tests import damaged_box
@@ -89,9 +91,10 @@ def test_cases_that_fail_or_do_not_fit_stop_nothing(tmp_path: Path) -> None:
 
 
 def test_a_case_that_takes_too_long_is_a_row_with_an_error(tmp_path: Path) -> None:
-    job = damaged_box.write(tmp_path, SIMULATED)
-    done = evaluate("job", job, "--seeds", 1, "--size", "4", "--timeout", 0.01)
-    assert done.returncode == 0, done.stderr
+    job = damaged_box.write(tmp_path, SIMULATED.replace("20000", "2000"), 2000)
+    words = ["evaluate", "job", str(job), "--seeds", "1", "--size", "4", "--timeout", "0.01"]
+    done = CliRunner().invoke(app, words)
+    assert done.exit_code == 0, done.output
     assert "was ended: not finished after 0.01 s" in done.stderr
     assert "Damage of no depth was found in at least 95 % of the cases (0 of 1 at 4 mm, the deepest)" in done.stdout
 
@@ -117,10 +120,15 @@ def test_the_virtual_scanner_is_like_the_jobs_scan(real: Path, tmp_path: Path, r
     assert np.array_equal(a.truth.T_part_scan, np.eye(4))
 
 
-def test_the_key_does_not_depend_on_where_the_files_lie(real: Path, tmp_path: Path, registry: Registry) -> None:
-    other = damaged_box.write(tmp_path / "moved")
+@pytest.fixture
+def sparse(tmp_path: Path) -> Path:
+    return damaged_box.write(tmp_path, points=2000)
+
+
+def test_the_key_does_not_depend_on_where_the_files_lie(sparse: Path, tmp_path: Path, registry: Registry) -> None:
+    other = damaged_box.write(tmp_path / "moved", points=2000)
     (tmp_path / "place").mkdir()
-    here = plan_study(real, VariationRequest(), 1, registry, tmp_path).cases
+    here = plan_study(sparse, VariationRequest(), 1, registry, tmp_path).cases
     there = plan_study(other, VariationRequest(), 1, registry, tmp_path / "place").cases
     assert [case.compute_key() for case in here] == [case.compute_key() for case in there]
     other.write_text(damaged_box.JOB + "allowance: none\n")
@@ -141,19 +149,21 @@ def test_the_key_does_not_depend_on_where_the_files_lie(real: Path, tmp_path: Pa
     ],
 )
 def test_faults_are_named_before_anything_runs(
-    real: Path, tmp_path: Path, registry: Registry, wanted: dict[str, Any], said: str
+    sparse: Path, tmp_path: Path, registry: Registry, wanted: dict[str, Any], said: str
 ) -> None:
     with pytest.raises(DamageestError) as caught:
-        plan_study(real, VariationRequest(**wanted), 1, registry, tmp_path)
+        plan_study(sparse, VariationRequest(**wanted), 1, registry, tmp_path)
     assert said in str(caught.value)
     assert caught.value.exit_status == 2
 
 
+@pytest.mark.slow
 def test_a_jobs_cut_back_is_no_error_of_its_damage(tmp_path: Path) -> None:
     stock = "allowance: {use: milling, outer: 1, inner: 1}\n"
     ious = []
-    for text in (SIMULATED, SIMULATED + stock):
-        path = damaged_box.write(tmp_path, text)
+    simulated = SIMULATED.replace("20000", "6000")
+    for text in (simulated, simulated + stock):
+        path = damaged_box.write(tmp_path, text, 2000)
         (case,) = plan_study(path, VariationRequest(size="4"), 1, Registry.discover(), tmp_path).cases
         ious.append(case_module.run_case(case)["iou"])
     assert ious[0] == ious[1] > 0.9

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,7 +12,14 @@ from damageest_evaluate.paths.check import count_crossings, measure_nozzle
 from damageest_evaluate.paths.run import evaluate_scene, make_table
 from damageest_evaluate.paths.scenes import MAKERS, make_random
 
-from tests.path_shapes import dent, plan
+from damageest.artefacts import DepositPath
+from tests.path_shapes import Loss, dent, plan
+
+
+@cache
+def plan_dent() -> tuple[Loss, DepositPath]:
+    loss = dent()
+    return loss, plan(loss, direction=(0.0, 0.0, 1.0), simulate=False)
 
 
 @pytest.mark.slow
@@ -30,16 +38,14 @@ def test_a_tooth_is_built_up_with_five_axes_and_nothing_is_touched() -> None:
 
 
 def test_the_check_sees_a_nozzle_in_metal() -> None:
-    loss = dent()
-    path = plan(loss, direction=(0.0, 0.0, 1.0), simulate=False)
+    loss, path = plan_dent()
     assert measure_nozzle(path, loss.left, 0.2) >= 0.75 * min(path.clearance, path.travel_clearance)
     lower = replace(path, points=path.points - [0, 0, path.standoff + path.width])
     assert measure_nozzle(lower, loss.left, 5.0) == pytest.approx(0, abs=1e-9)
 
 
 def test_the_check_sees_beads_and_beam_in_metal() -> None:
-    loss = dent()
-    path = plan(loss, direction=(0.0, 0.0, 1.0), simulate=False)
+    loss, path = plan_dent()
     assert measure_shaded(path, loss.left, path.width / 4) == 0
     assert measure_sunk(path, loss.left, path.width / 4) <= 0.05 * loss.lost.volume
     lower = replace(path, points=path.points - [0, 0, 6.0])  # the dent is 4 deep
@@ -51,7 +57,7 @@ def test_the_check_sees_beads_and_beam_in_metal() -> None:
 
 
 def test_the_check_sees_a_rotary_axis_that_flips() -> None:
-    path = plan(dent(), direction=(0.0, 0.0, 1.0), simulate=False)
+    _, path = plan_dent()
     assert count_flips(path) == 0
     axes = path.axes.copy()
     axes[:] = [0.6, 0.0, 0.8]
@@ -62,7 +68,7 @@ def test_the_check_sees_a_rotary_axis_that_flips() -> None:
 
 
 def test_the_check_sees_a_pass_that_crosses_itself() -> None:
-    path = plan(dent(), direction=(0.0, 0.0, 1.0), simulate=False)
+    _, path = plan_dent()
     assert count_crossings(path) == 0
     points = path.points.copy()
     own = np.flatnonzero(path.on & (path.number == path.passes))

@@ -77,6 +77,7 @@ def test_a_loss_is_far_deeper_than_the_noise_and_small(number: int) -> None:
     assert scan.truth.damage.volume < 0.1 * part.volume
 
 
+@pytest.mark.slow
 def test_a_run_is_judged_and_its_cost_compared() -> None:
     (case,) = make_realistic_cases(["tomography"], ["cylinder"], points=4000)
     assert not case.damaged

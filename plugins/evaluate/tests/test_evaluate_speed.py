@@ -8,11 +8,14 @@ import pytest
 from damageest_evaluate.readme import make_marks
 from damageest_evaluate.speed import KINDS, make_speed_cases
 from evaluate_calls import evaluate
+from typer.testing import CliRunner
 
-from damageest.errors import InputError
+from damageest.cli import app
+from damageest.errors import DamageestError, InputError
 from damageest.registry import Registry
 
 
+@pytest.mark.slow
 def test_a_case_is_measured_against_one_distance_pass(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     begin, end = make_marks("speed")
@@ -33,9 +36,10 @@ def test_a_case_is_measured_against_one_distance_pass(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("words", "said"), [(["--kinds", "small chap"], "small chip"), (["--points", "many"], "1e6")])
 def test_a_wrong_value_is_refused(words: list[str], said: str) -> None:
-    done = evaluate("speed", *words)
-    assert done.returncode == 2
-    assert said in done.stderr
+    with pytest.raises(DamageestError) as caught:
+        CliRunner().invoke(app, ["evaluate", "speed", *words], catch_exceptions=False)
+    assert caught.value.exit_status == 2
+    assert said in str(caught.value)
 
 
 def test_cases_have_the_damage_of_their_kind(registry: Registry) -> None:

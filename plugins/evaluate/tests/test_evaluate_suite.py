@@ -14,8 +14,10 @@ from damageest_evaluate.readme import make_marks
 from damageest_evaluate.report import COLUMNS
 from damageest_evaluate.variants import VariationRequest
 from evaluate_calls import evaluate, rows_of, timeless
+from typer.testing import CliRunner
 
-from damageest.errors import InputError
+from damageest.cli import app
+from damageest.errors import DamageestError, InputError
 from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.part import ReadPart
@@ -94,17 +96,19 @@ def test_cases_go_through_parts_and_kinds_in_turn_and_their_seeds_differ(registr
     ],
 )
 def test_faults_are_named(words: list[str], said: str) -> None:
-    done = evaluate("suite", *words)
-    assert done.returncode == 2
-    assert said in done.stderr
+    with pytest.raises(DamageestError) as caught:
+        CliRunner().invoke(app, ["evaluate", "suite", *words], catch_exceptions=False)
+    assert caught.value.exit_status == 2
+    assert said in str(caught.value)
 
 
 def test_a_page_without_marks_is_refused_before_anything_runs(tmp_path: Path) -> None:
     page = tmp_path / "page.md"
     page.write_text("no marks\n")
-    done = evaluate("suite", "--write", page)
-    assert done.returncode == 2
-    assert "suite: begin" in done.stderr
+    done = CliRunner().invoke(app, ["evaluate", "suite", "--write", str(page)])
+    assert isinstance(done.exception, InputError)
+    assert done.exception.exit_status == 2
+    assert "suite: begin" in str(done.exception)
     assert "[1/" not in done.stderr
 
 

@@ -34,7 +34,14 @@ def test_the_suite_is_as_large_as_the_docs_say() -> None:
     assert {case.part for case in CASES} <= set(NAMES)
 
 
-@pytest.mark.parametrize("case", FIRST, ids=[case.kind for case in FIRST])
+DEAR = ("wear: bore", "wear: half a shaft", "wear: one side of a journal")
+"""Each takes 2 s and more to make."""
+
+
+@pytest.mark.parametrize(
+    "case",
+    [pytest.param(case, marks=[pytest.mark.slow] if case.kind in DEAR else [], id=case.kind) for case in FIRST],
+)
 def test_each_kind_makes_a_scan_with_its_truth(case: TroubleCase) -> None:
     scene = make_scene(case)
     assert 150 < len(scene.points) <= 1.2 * max(case.points, case.amount)

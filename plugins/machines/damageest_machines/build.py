@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ from damageest.stages.export import PathSettings
 from damageest_machines.angles import turn_axes
 from damageest_machines.definition import Machine
 from damageest_machines.moves import TO_MM, Moves, make_moves, split_moves
-from damageest_machines.positions import Positions, find_positions
+from damageest_machines.positions import Positions, check_kinematics, find_positions
 from damageest_machines.program import Program, find_exact
 from damageest_machines.rotary import turn_rotary
 from damageest_machines.timing import measure_minutes
@@ -39,15 +40,28 @@ def build_program(path: DepositPath, settings: PathSettings, machine: Machine) -
     return Program(machine, path, settings, moves, at, name, title, exact, minutes, (*notes, *at.notes))
 
 
-def _check_channels(path: DepositPath, machine: Machine) -> None:
+def check_machine(machine: Machine, channels: Sequence[str]) -> None:
+    """Raises StageError where no path with these channels could be run on the machine, wherever it goes."""
+    _check_names(channels, machine)
+    _check_table(machine)
+    check_kinematics(machine)
+
+
+def _check_names(channels: Sequence[str], machine: Machine) -> None:
     known = machine.process.channels
-    for number, name in enumerate(path.channels):
+    for name in channels:
         if name not in known:
             raise StageError(
                 f"the path has a channel '{name}', for which {machine.name} has no command",
                 f"process.channels.{name} in the machine file, or leave it out of path.process; there are: "
                 f"{', '.join(known) or 'none'}",
             )
+
+
+def _check_channels(path: DepositPath, machine: Machine) -> None:
+    _check_names(path.channels, machine)
+    known = machine.process.channels
+    for number, name in enumerate(path.channels):
         assert path.values is not None
         given = path.values[path.on, number]
         low, high = known[name].least, known[name].most
@@ -59,13 +73,17 @@ def _check_channels(path: DepositPath, machine: Machine) -> None:
             )
 
 
-def _follow_table(machine: Machine, moves: Moves, at: Positions, standoff: float) -> tuple[Moves, Positions]:
-    """Moves cut so that points on a table that turns stay on their lines, though the control knows nothing of it."""
-    if any(axis.carries == "tool" for axis in machine.rotary):
+def _check_table(machine: Machine) -> None:
+    if machine.post.tcp == "table" and any(axis.carries == "tool" for axis in machine.rotary):
         raise StageError(
             f"{machine.name}: post.tcp: table needs both rotary axes in the table, but one carries the tool",
             "post.tcp: control",
         )
+
+
+def _follow_table(machine: Machine, moves: Moves, at: Positions, standoff: float) -> tuple[Moves, Positions]:
+    """Moves cut so that points on a table that turns stay on their lines, though the control knows nothing of it."""
+    _check_table(machine)
     far = max(float(np.linalg.norm(at.linear - axis.point, axis=1).max()) for axis in machine.rotary)
     step = min(machine.post.step, float(np.degrees(2 * np.arccos(1 - min(CHORD / max(far, CHORD), 1.0)))))
     turns = np.abs(np.diff(at.rotary, axis=0)).max(axis=1, initial=0.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,8 @@ def read_machine(file: Path) -> Machine:
 @cache
 def _read(file: Path, changed: int) -> Machine:
     values, positions = read(file)
+    if not isinstance(values, Mapping):
+        raise StageError(f"{file.name}: a machine file is a mapping with at least name and process", _REMEDY)
     try:
         return Machine.model_validate(values)
     except ValidationError as error:

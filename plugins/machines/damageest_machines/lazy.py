@@ -27,9 +27,26 @@ DIALECTS = {
 def list_writers() -> Mapping[str, PathWriter]:
     """One for each dialect, and json."""
     writers = {
-        name: PathWriter(partial(_write, module, cls), suffix) for name, (module, cls, suffix) in DIALECTS.items()
+        name: PathWriter(partial(_write, module, cls), suffix, partial(_check, module, cls))
+        for name, (module, cls, suffix) in DIALECTS.items()
     }
-    return writers | {"json": PathWriter(_write_json, "json")}
+    return writers | {"json": PathWriter(_write_json, "json", _check_json)}
+
+
+def _check(module: str, cls: str, settings: PathSettings, channels: Sequence[str]) -> None:
+    from damageest_machines.post import make_writer
+
+    check = make_writer(getattr(import_module(f"damageest_machines.writers.{module}"), cls)).check
+    assert check is not None
+    check(settings, channels)
+
+
+def _check_json(settings: PathSettings, channels: Sequence[str]) -> None:
+    if settings.machine is not None:
+        from damageest_machines.build import check_machine
+        from damageest_machines.files import find_file, read_machine
+
+        check_machine(read_machine(find_file(settings.machine)), channels)
 
 
 def _write(module: str, cls: str, file: Path, path: DepositPath, settings: PathSettings) -> Sequence[str] | None:

@@ -122,6 +122,26 @@ def _check_reach(machine: Machine, moves: Moves, poses: Floats) -> None:
             )
 
 
+def check_kinematics(machine: Machine) -> None:
+    """Raises StageError where the machine has joints and no plugin knows them. A pose, the base's own frame, is asked
+    for to learn that; whether it can be taken does not matter."""
+    if machine.robot is None or not machine.robot.joints:
+        return
+    from damageest import Registry
+
+    turns = np.zeros((1, len(machine.rotary)))
+    hook = Registry.discover().hooks.hook.damageest_kinematics
+    if hook(machine=machine.robot.joints, poses=np.eye(4)[None], turns=turns) is None:
+        raise _refuse_joints(machine.robot.joints)
+
+
+def _refuse_joints(name: str) -> StageError:
+    return StageError(
+        f"no plugin gives joints for '{name}' by the hook damageest_kinematics",
+        "install the plugin, or leave robot.joints out of the machine file",
+    )
+
+
 def _find_joints(machine: Machine, moves: Moves, poses: Floats, rotary: Floats) -> Floats | None:
     """What the hook damageest_kinematics gives. Raises StageError where a pose has no joints, one is beyond its limits
     or jumps."""
@@ -134,10 +154,7 @@ def _find_joints(machine: Machine, moves: Moves, poses: Floats, rotary: Floats) 
     hook = Registry.discover().hooks.hook.damageest_kinematics
     found = hook(machine=robot.joints, poses=poses, turns=rotary)
     if found is None:
-        raise StageError(
-            f"no plugin gives joints for '{robot.joints}' by the hook damageest_kinematics",
-            "install the plugin, or leave robot.joints out of the machine file",
-        )
+        raise _refuse_joints(robot.joints)
     joints = np.asarray(found, float)
     if joints.ndim != 2 or len(joints) != len(poses):
         raise StageError(f"the hook damageest_kinematics gave {joints.shape} joints for {len(poses)} poses")

@@ -12,7 +12,8 @@ import numpy as np
 from damageest.artefacts import DepositPath, Floats
 from damageest.errors import StageError
 from damageest.stages.export import PathSettings, PathWriter, describe_setup
-from damageest_machines.build import build_program
+from damageest_machines.build import build_program, check_machine
+from damageest_machines.definition import Machine
 from damageest_machines.files import find_file, read_machine
 from damageest_machines.moves import TO_MM, TURNED_BACK
 from damageest_machines.program import Program
@@ -31,7 +32,14 @@ class Post(ABC):
     """Whether it writes for robots or for machine tools."""
     newline: ClassVar[str] = "\n"
 
+    @classmethod
+    def check_machine(cls, machine: Machine) -> None:
+        """Raises StageError where no program for this machine can be written, whatever the path: one without moves can.
+        Called before the path is planned, and again for the program."""
+        return
+
     def __init__(self, program: Program) -> None:
+        self.check_machine(program.machine)
         self.program = program
         self.machine, self.moves, self.at = program.machine, program.moves, program.at
         self.told: dict[str, str] = {}
@@ -102,11 +110,15 @@ class CncPost(Post):
     tables: ClassVar[bool] = False
     """Whether it writes programs for controls that know no tool centre point."""
 
+    @classmethod
+    def check_machine(cls, machine: Machine) -> None:
+        """Refuses a control without tool centre point, unless the class writes for one."""
+        if machine.rotary and machine.post.tcp == "table" and not cls.tables:
+            raise StageError(f"the format .{cls.suffix} leaves the tool's point to the control", "post.tcp: control")
+
     def __init__(self, program: Program) -> None:
         super().__init__(program)
         machine = self.machine
-        if machine.rotary and machine.post.tcp == "table" and not self.tables:
-            raise StageError(f"the format .{self.suffix} leaves the tool's point to the control", "post.tcp: control")
         self.has_vectors = bool(machine.rotary) and machine.post.orientation == "vectors"
         if self.has_vectors:
             self._check_vectors()
@@ -138,19 +150,25 @@ class CncPost(Post):
         return words[0], " ".join(filter(None, words[1:]))
 
 
+def check_dialect(post: type[Post], machine: Machine) -> None:
+    """Raises StageError where a dialect has no words for a machine."""
+    kind = "cnc" if machine.robot is None else "robot"
+    if kind != post.serves:
+        words = {"cnc": "machine tools", "robot": "robots"}
+        raise StageError(
+            f"the format .{post.suffix} is for {words[post.serves]}, and {machine.name} is none of them",
+            "another export.machine, or another format in export.paths",
+        )
+    post.check_machine(machine)
+
+
 def make_writer(post: type[Post]) -> PathWriter:
     """A writer of paths for the hook `damageest_path_writers`. It reads the machine of the job, and refuses a path that
     the machine cannot run."""
 
     def write(file: Path, path: DepositPath, settings: PathSettings) -> Sequence[str]:
         machine = read_machine(find_file(settings.machine))
-        kind = "cnc" if machine.robot is None else "robot"
-        if kind != post.serves:
-            words = {"cnc": "machine tools", "robot": "robots"}
-            raise StageError(
-                f"the format .{post.suffix} is for {words[post.serves]}, and {machine.name} is none of them",
-                "another export.machine, or another format in export.paths",
-            )
+        check_dialect(post, machine)
         if not len(path.points):
             file.write_text("", encoding="ascii")
             return ["is empty: the path has no pass"]
@@ -158,7 +176,12 @@ def make_writer(post: type[Post]) -> PathWriter:
         file.write_bytes(post(program).write().encode("ascii", "replace"))
         return program.notes
 
-    return PathWriter(write, post.suffix)
+    def check(settings: PathSettings, channels: Sequence[str]) -> None:
+        machine = read_machine(find_file(settings.machine))
+        check_dialect(post, machine)
+        check_machine(machine, channels)
+
+    return PathWriter(write, post.suffix, check)
 
 
 def format_words(names: str | Sequence[str], values: Floats, decimals: int, join: str = " ") -> str:

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pytest
 from machine_checks import compare, load
 from machine_readers import Read
 from scipy.spatial.transform import Rotation
@@ -59,9 +58,9 @@ def test_the_dialect_of_the_guide_follows_the_path(tmp_path: Path) -> None:
     assert off.feed < 1e-3
 
 
-@pytest.mark.parametrize("file", WRITERS, ids=lambda file: file.stem)
-def test_a_dialect_is_short(file: Path) -> None:
-    assert len(file.read_text().splitlines()) <= MOST
+def test_a_dialect_is_short() -> None:
+    assert WRITERS
+    assert [file.name for file in WRITERS if len(file.read_text().splitlines()) > MOST] == []
     assert len(read_dialect().splitlines()) <= MOST
 
 

@@ -44,8 +44,9 @@ def read_advice(error: StageError, option: str) -> float:
 
 @pytest.mark.parametrize(
     ("name", "least"),
-    [*(pytest.param(*one, marks=pytest.mark.slow) for one in (("edge", 0.94), ("end", 0.99), ("two", 0.83))),
-     ("pit", 0.92), ("deep hole", 0.82), ("worn through", 0.89), ("beside the bore", 0.92)],
+    [("pit", 0.92), ("worn through", 0.89),
+     *(pytest.param(*one, marks=pytest.mark.slow) for one in (
+         ("edge", 0.94), ("end", 0.99), ("two", 0.83), ("deep hole", 0.82), ("beside the bore", 0.92)))],
 )  # fmt: skip
 def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
     case = scene(name)
@@ -68,16 +69,17 @@ def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
     assert np.abs(item.solid.bounds - truth.bounds).max() < 6 * CELL
 
 
-def test_the_route_gives_the_lost_half_ball(tmp_path: Path) -> None:
-    result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "method: octree\n"))
+@pytest.mark.parametrize(("points", "off"), [(10_000, 0.16), pytest.param(20_000, 0.08, marks=pytest.mark.slow)])
+def test_the_route_gives_the_lost_half_ball(points: int, off: float, tmp_path: Path) -> None:
+    result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "method: octree\n", points))
     (site,) = result.sites
-    assert site.damage.volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.08)
+    assert site.damage.volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=off)
     assert site.evidence.consistent
 
 
 def test_coarser_cells_give_a_coarser_volume() -> None:
     case = scene("end")
-    fine, middle, coarse = (iou(intersect(case, enclose("end", cell=cell)), case.truth) for cell in (CELL, 0.8, 1.6))
+    fine, middle, coarse = (iou(intersect(case, enclose("end", cell=cell)), case.truth) for cell in (0.6, 1.0, 1.6))
     assert fine > middle > coarse > 0.9
 
 
@@ -106,6 +108,7 @@ def test_the_default_cell_grows_to_fit_into_memory_and_a_note_says_so() -> None:
     assert iou(intersect(case, enclosures), case.truth) > 0.95
 
 
+@pytest.mark.slow
 def test_a_grid_round_a_loss_that_does_not_fit_into_memory_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     inputs = scene("end").inputs()
     monkeypatch.setattr(octree, "BYTES_PER_CELL", 20_000)
@@ -115,7 +118,7 @@ def test_a_grid_round_a_loss_that_does_not_fit_into_memory_is_refused(monkeypatc
 
 
 @pytest.mark.parametrize(
-    "options", [{"cell": 0.05}, {"depth": 12}, pytest.param({"cell": 0.13}, marks=pytest.mark.slow)]
+    "options", [{"depth": 12}, *(pytest.param({"cell": cell}, marks=pytest.mark.slow) for cell in (0.05, 0.13))]
 )
 def test_cells_finer_than_the_scan_are_refused(options: dict[str, Any]) -> None:
     case = scene("pit")
@@ -141,7 +144,7 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
 
 
 def test_the_same_input_gives_the_same_bytes() -> None:
-    first, again = enclose("two"), Octree().run(**scene("two").inputs())
+    first, again = enclose("pit"), Octree().run(**scene("pit").inputs())
     for one, other in zip(first.items, again.items, strict=True):
         assert one.solid.vertices.tobytes() == other.solid.vertices.tobytes()
         assert one.solid.faces.tobytes() == other.solid.faces.tobytes()

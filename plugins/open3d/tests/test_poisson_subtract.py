@@ -75,9 +75,8 @@ def read_sliver_note(enclosures: Enclosures) -> tuple[int, int, float]:
     return int(found[1]), int(found[2]), float(found[3])
 
 
-@pytest.mark.parametrize(
-    "name", [name if name == "end" else pytest.param(name, marks=pytest.mark.slow) for name in TOOLS]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", TOOLS)
 def test_the_part_inside_it_is_the_damage_and_slivers(name: str) -> None:
     enclosures = enclose(name)
     truth = to_solid(Manifold.cube(tuple(SIZE), True) ^ TOOLS[name]())

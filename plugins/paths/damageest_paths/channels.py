@@ -83,4 +83,9 @@ def check_table(table: tuple[Setting, ...]) -> tuple[Setting, ...]:
     return table
 
 
+def list_channels(table: tuple[Setting, ...]) -> tuple[str, ...]:
+    """The names of the channels that a table sets, in the order in which paths have them; not the speed."""
+    return tuple(dict.fromkeys(name for row in table for name in row.set if name != SPEED))
+
+
 ProcessTable = Annotated[tuple[Setting, ...], AfterValidator(check_table)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
 import numpy as np
@@ -13,7 +14,8 @@ from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.path import Path
 from damageest_paths.calibration import Trials, check_reach, complete_size, relax_size
-from damageest_paths.channels import SPEED, ProcessTable
+from damageest_paths.channels import SPEED, ProcessTable, list_channels
+from damageest_paths.mesh_files import find_mesh_fault, read_mesh_file
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -197,6 +199,14 @@ class Layers(Path):
     def _gap(self) -> float:
         return self.clearance or self.width / 4
 
+    def list_channels(self) -> tuple[str, ...]:
+        """Those that the table of the process sets, but for the speed, which is the feed."""
+        return list_channels(self.process)
+
+    def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
+        """A nozzle or a fixture whose mesh cannot be used."""
+        return [*find_mesh_fault(self.nozzle.mesh, "nozzle", "mesh"), *find_mesh_fault(self.fixture, "fixture")]
+
     def rank_site(self, number: int) -> int:
         """Sites named in ``sites`` come first, in that order."""
         return self.sites.index(number) if number in self.sites else len(self.sites)
@@ -242,7 +252,7 @@ class Layers(Path):
             direction = np.array(self.direction) / np.linalg.norm(self.direction)
         others: list[Mesh] = [built] if built is not None else []
         if self.fixture is not None:
-            others.append(_read_mesh(self.fixture, "fixture", False))
+            others.append(read_mesh_file(self.fixture, "fixture"))
         task, nozzle = Task(body, left, others, tolerance), self._make_nozzle()
         speeds = Speeds(self.feed, fast, self.travel_clearance)
 
@@ -262,26 +272,9 @@ class Layers(Path):
 
         shape = self.nozzle
         if shape.mesh is not None:
-            return nozzle.Nozzle(_read_mesh(shape.mesh, "nozzle", True))
+            return nozzle.Nozzle(read_mesh_file(shape.mesh, "nozzle"))
         assert shape.tip_radius is not None
         assert shape.body_radius is not None
         assert shape.length is not None
         angle = float(np.radians(shape.cone_angle))
         return nozzle.make_nozzle(nozzle.Cone(shape.tip_radius, shape.body_radius, shape.length, angle))
-
-
-def _read_mesh(path: JobPath, what: str, is_closed: bool) -> Mesh:
-    """A mesh from a file. Raises StageError where it cannot be read, or is not closed where it has to be."""
-    from damageest.artefacts import open_edges
-    from damageest.geometry.duplicates import find_duplicates
-    from damageest.io.meshes import read_mesh
-
-    try:
-        vertices, faces, _ = read_mesh(path)
-        keep, number = find_duplicates(vertices)
-        mesh = Mesh(vertices[keep], number[faces])
-    except Exception as error:
-        raise StageError(f"{what}: {path.name} cannot be read: {error}", "give an STL, PLY or OBJ file") from error
-    if not len(mesh.faces) or (is_closed and open_edges(mesh.faces)):
-        raise StageError(f"{what}: {path.name} is {'not closed' if len(mesh.faces) else 'empty'}", "give a closed mesh")
-    return mesh

@@ -17,9 +17,10 @@ from manifold3d import CrossSection, Manifold
 from damageest.geometry.solids import to_manifold, to_solid
 from tests.path_shapes import BLOCK, Loss, cut
 
-BORE, DEPTH, LONG = 20.0, 3.0, 16.0
+BORE, DEPTH, LONG = 20.0, 3.0, 8.0
 """Radius of the bore, depth of its groove, length of the half shell."""
-BALL = 12.0
+BALL, SUNK = 12.0, 3.0
+"""Radius of a ball, and how deep its mark is."""
 
 
 def groove(half: float = 50.0) -> Loss:
@@ -38,8 +39,8 @@ def _lay(body: Any) -> Any:
 
 
 def bowl() -> Loss:
-    """The mark of a ball in the top of a block, 4 deep."""
-    return cut(BLOCK, Manifold.sphere(BALL, 160).translate((0, 0, BALL - 4)))
+    """The mark of a ball in the top of a block."""
+    return cut(BLOCK, Manifold.sphere(BALL, 160).translate((0, 0, BALL - SUNK)))
 
 
 def pocket() -> Loss:
@@ -65,9 +66,9 @@ def low_stair() -> Loss:
     return cut(BLOCK, tool)
 
 
-def crescent() -> Loss:
+def crescent(radius: float, long: float) -> Loss:
     """A shaft about the y axis that is worn on its upper side, by 1 at most: the floor is round up to its border."""
-    shaft, left = (_lay(Manifold.cylinder(LONG, 18, 18, 256)).translate((0, 0, z)) for z in (0, -1))
+    shaft, left = (_lay(Manifold.cylinder(long, radius, radius, 256)).translate((0, 0, z)) for z in (0, -1))
     return cut(shaft, Manifold.cube((60, 60, 60), True) - left)
 
 

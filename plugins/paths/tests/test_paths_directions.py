@@ -12,12 +12,16 @@ from damageest_paths.floor import Floor, make_floor
 from damageest_paths.frames import Frame
 from damageest_paths.planar import Surroundings, plan_planar
 from damageest_paths.process import Plan, Process
+from manifold3d import Manifold
 from path_cavities import pocket, prepare, stair
 
-from tests.path_shapes import Loss
+from tests.path_shapes import BLOCK, Loss, cut
+
+SMALL = cut(BLOCK, Manifold.cube((10, 8, 9)).translate((-5, -4, -3)))
+"""A pocket 3 deep."""
 
 
-@pytest.mark.parametrize("loss", [pocket(), stair()])
+@pytest.mark.parametrize("loss", [SMALL, *(pytest.param(loss, marks=pytest.mark.slow) for loss in (pocket(), stair()))])
 def test_trials_given_up_are_those_of_no_chosen_direction(loss: Loss, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = prepare(loss, shortest=1.0)
     directions = [

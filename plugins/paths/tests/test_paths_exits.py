@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ def make_fork(with_lids: bool = False) -> Loss:
     return cut(fork, Manifold.sphere(9, 48).translate((x + 6, 0, 0)))
 
 
+@cache
 def plan_fork(axes: int, with_lids: bool = False) -> tuple[Loss, DepositPath]:
     loss = make_fork(with_lids)
     return loss, plan(loss, axes=axes, direction=INWARD)

@@ -66,7 +66,7 @@ def test_what_no_layer_would_reach_asks_for_no_other_layers(monkeypatch: pytest.
 
 
 def test_the_form_is_that_which_is_asked_for() -> None:
-    assert plan(dent(), direction=UP, layers="planar").layer_form == "planar"
+    assert plan(dent(), direction=UP, layers="planar", simulate=False).layer_form == "planar"
     assert plan(pocket(), direction=UP, layers="conformal", simulate=False).layer_form == "conformal"
 
 

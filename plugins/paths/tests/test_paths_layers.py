@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from damageest_evaluate.paths.check import measure_nozzle
 from damageest_paths.layers import Layers
+from manifold3d import Manifold
 from path_cavities import bowl, groove, stair, tip
 from pydantic import ValidationError
 
@@ -16,7 +17,7 @@ from damageest.artefacts import DepositPath, Mesh, Solid
 from damageest.errors import StageError
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.transforms import turn_to_axis
-from tests.path_shapes import NOZZLE, OPTIONS, TOLERANCE, Loss, corner, dent, plan, slot
+from tests.path_shapes import BLOCK, NOZZLE, OPTIONS, TOLERANCE, Loss, corner, cut, dent, plan
 
 UP = (0.0, 0.0, 1.0)
 
@@ -66,6 +67,12 @@ def test_other_patterns_fill_it_too(pattern: str) -> None:
     assert measure_others(path) < 0.01 * path.deposit_volume
 
 
+def slot() -> Loss:
+    """A deep and short slot with upright walls, open upward and to both sides."""
+    block = BLOCK ^ Manifold.cube((60, 6, 60), True)
+    return cut(block, Manifold.cube((8, 60, 24)).translate((-4, -30, -12)))
+
+
 def measure_gap(path: DepositPath, obstacle: Mesh) -> float:
     """The least distance of the nozzle's corners and sides from a mesh over all poses, by other means than the
     planner's: densely placed points on the nozzle, and libigl."""
@@ -73,7 +80,7 @@ def measure_gap(path: DepositPath, obstacle: Mesh) -> float:
     share = np.linspace(0, 1, 12)[:, None]
     edges = np.unique(np.sort(nozzle.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)), axis=0)
     ends = nozzle.vertices[edges]
-    skin = np.concatenate([end[0] + share * (end[1] - end[0]) for end in ends[::3]])
+    skin = np.concatenate([end[0] + share * (end[1] - end[0]) for end in ends[::6]])
     found = np.inf
     for k in np.flatnonzero(path.on):
         for part in (0.0, 0.5):
@@ -113,20 +120,21 @@ def test_what_hangs_in_the_air_is_not_built() -> None:
 
 
 def test_the_direction_is_found() -> None:
-    found = plan(dent())
+    found = plan(dent(), simulate=False)
     assert found.directions[0] == pytest.approx(UP, abs=1e-3)
-    assert plan(dent(), direction="normal").directions[0] == pytest.approx(UP, abs=1e-3)
+    assert plan(dent(), direction="normal", simulate=False).directions[0] == pytest.approx(UP, abs=1e-3)
 
 
 def test_another_deposit_and_a_fixture_are_kept_clear_of(tmp_path: Any) -> None:
     import trimesh
 
-    loss = dent()
-    wall = trimesh.creation.box((30, 2, 30), transform=trimesh.transformations.translation_matrix((0, 6, 16)))
+    loss = cut(BLOCK, Manifold.sphere(10, 64).translate((0, 0, 7)))
+    wall = trimesh.creation.box((30, 2, 30), transform=trimesh.transformations.translation_matrix((0, 4, 16)))
     wall.export(tmp_path / "wall.stl")
-    held = plan(loss, direction=UP, fixture=tmp_path / "wall.stl")
+    held = plan(loss, direction=UP, fixture=tmp_path / "wall.stl", simulate=False)
     solid = Solid(wall.vertices, wall.faces)
-    beside = Layers(**OPTIONS, direction=UP).run(body=loss.lost, left=loss.left, built=solid, tolerance=TOLERANCE)
+    stage = Layers(**OPTIONS, direction=UP, simulate=False)
+    beside = stage.run(body=loss.lost, left=loss.left, built=solid, tolerance=TOLERANCE)
     assert beside is not None
     assert held.unreached_volume == pytest.approx(beside.unreached_volume, rel=1e-6)
     assert held.unreached_volume > 0.1 * loss.lost.volume
@@ -134,13 +142,14 @@ def test_another_deposit_and_a_fixture_are_kept_clear_of(tmp_path: Any) -> None:
 
 
 def test_the_same_twice() -> None:
-    first, second = plan(corner()), plan(corner())
+    loss = cut(BLOCK, Manifold.cube((16, 14, 9)).translate((14, 9, -3)))
+    first, second = plan(loss), plan(loss)
     assert first.points.tobytes() == second.points.tobytes()
     assert first.axes.tobytes() == second.axes.tobytes()
 
 
 def test_short_passes_are_left_out_and_listed() -> None:
-    path = plan(dent(), direction=UP, min_length=30.0)
+    path = plan(dent(), direction=UP, min_length=30.0, simulate=False)
     assert any("shortest pass" in item.why for item in path.unreached)
     lengths = np.bincount(path.number[path.on], weights=path.moves[path.on])
     assert lengths[lengths > 0].min() >= 30
@@ -148,7 +157,7 @@ def test_short_passes_are_left_out_and_listed() -> None:
 
 def test_overlaps_at_start_and_stop() -> None:
     overlaps = {"start_overlap": 0.4, "stop_overlap": 0.6}
-    plain, longer = (plan(dent(), direction=UP, **more) for more in ({}, overlaps))
+    plain, longer = plan_dent(), plan(dent(), direction=UP, simulate=False, **overlaps)
     assert longer.passes == plain.passes
     assert longer.length == pytest.approx(plain.length + plain.passes * 1.0, rel=1e-3)
 
@@ -222,6 +231,6 @@ def test_a_nozzle_from_a_mesh(tmp_path: Any) -> None:
     body = trimesh.creation.cylinder(1.0, 60, transform=trimesh.transformations.translation_matrix((0, 0, 30)))
     body.export(tmp_path / "nozzle.stl")
     loss: Loss = dent()
-    path = plan(loss, direction=UP, nozzle={"mesh": tmp_path / "nozzle.stl"})
+    path = plan(loss, direction=UP, nozzle={"mesh": tmp_path / "nozzle.stl"}, simulate=False)
     assert measure_others(path) < 0.01 * path.deposit_volume
     assert len(path.nozzle.faces) == len(body.faces)

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import numba
 import numpy as np
 import pytest
 from damageest_paths.clearance import Clearance
-from damageest_paths.compiling import compile_loops, run_loops
 from damageest_paths.nozzle import Cone, make_nozzle
 from damageest_paths.obstacles import Obstacles
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.vectors import normalise
+from tests.needs import import_or_skip
+
+numba = import_or_skip("numba")
+if TYPE_CHECKING:
+    from damageest_paths import compiling
+else:
+    compiling = import_or_skip("damageest_paths.compiling")
 
 CONES = {
     "nozzle": Cone(1.0, 4.0, 12.0, np.radians(20)),
@@ -45,6 +50,7 @@ def measure(clearance: Clearance, triangles: Floats, point: Floats, axis: Floats
 
 
 @pytest.mark.parametrize("cone", CONES.values(), ids=CONES)
+@settings(deadline=None)  # the first call compiles
 @given(seed=st.integers(0, 10**6), needed=st.floats(0.05, 3.0))
 def test_the_true_distance_lies_between_the_bounds_for_each_shape(cone: Cone, seed: int, needed: float) -> None:
     """By FCL, among random triangles, large and small. A short nozzle has some of them behind it."""
@@ -88,15 +94,15 @@ def test_the_loops_are_compiled_where_no_folder_can_be_written(monkeypatch: pyte
     def add(one: float, other: float) -> float:
         return one + other
 
-    assert compile_loops(add)(1.0, 2.0) == 3.0
+    assert compiling.compile_loops(add)(1.0, 2.0) == 3.0
 
 
-@compile_loops
+@compiling.compile_loops
 def _double(value: float) -> float:
     return 2 * value
 
 
-@compile_loops
+@compiling.compile_loops
 def _double_and_add(value: float) -> float:
     return _double(value) + 1
 
@@ -110,5 +116,5 @@ def test_the_loops_run_where_the_disk_is_full(monkeypatch: pytest.MonkeyPatch) -
 
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.save", refuse)
     monkeypatch.setattr("numba.core.caching.IndexDataCacheFile.load", lambda *given: None)
-    assert run_loops(_double_and_add, 3.0) == 7.0
+    assert compiling.run_loops(_double_and_add, 3.0) == 7.0
     assert len(saved) == 2

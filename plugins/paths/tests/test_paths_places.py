@@ -134,8 +134,17 @@ def test_neighbours_have_the_time_to_cool_down(least: float) -> None:
     assert path.dwell.max() <= least
 
 
-@pytest.mark.parametrize("pattern", ["zigzag", "contour"])
-@pytest.mark.parametrize("loss", [dent, wall, pad])
+@pytest.mark.parametrize(
+    ("loss", "pattern"),
+    [
+        (wall, "zigzag"),
+        (pad, "contour"),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in ((wall, "contour"), (pad, "zigzag"), (dent, "zigzag"), (dent, "contour"))
+        ),
+    ],
+)
 def test_the_order_of_passes_leaves_beads_time(loss: Any, pattern: str) -> None:
     """Against the order with the shortest ways, with waits in it."""
     short = plan(loss(), direction=UP, simulate=False, pattern=pattern)

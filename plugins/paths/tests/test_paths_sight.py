@@ -24,7 +24,7 @@ CASES: dict[str, dict[str, Any]] = {
 
 @cache
 def make_case(name: str) -> tuple[Loss, DepositPath]:
-    loss = dent() if name in ("dent", "contour") else corner()
+    loss = dent() if name in ("dent", "contour") else cut(BLOCK, Manifold.cube((16, 14, 9)).translate((12, 8, -5)))
     return loss, plan(loss, **CASES[name])
 
 
@@ -45,7 +45,7 @@ def place_samples(path: DepositPath, step: float) -> tuple[Floats, Floats, Float
 
 def measure_beam(path: DepositPath, metal: Solid) -> float:
     """The share of the beads in whose beam, somewhat thinner than a bead, there is metal; by winding numbers."""
-    points, axes, _, _ = place_samples(path, 0.25)
+    points, axes, _, _ = place_samples(path, 0.5)
     side = np.cross(axes, [0.36, 0.48, 0.8])
     side /= np.linalg.norm(side, axis=1)[:, None]
     other = np.cross(axes, side)

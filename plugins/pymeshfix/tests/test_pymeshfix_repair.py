@@ -142,7 +142,7 @@ def test_a_whole_job_with_it_comes_near_the_truth() -> None:
     mesh = trimesh.creation.box((40, 30, 20))
     part = damageest.artefacts.Part(mesh.vertices, mesh.faces)
     tool = {"tool": "sphere", "centre": [0, 0, 10], "radius": 6}
-    scan = Simulate.model_validate({"damage": [tool], "points": 20_000, "noise": 0.04}).run("mm", part)
+    scan = Simulate.model_validate({"damage": [tool], "points": 6000, "noise": 0.04}).run("mm", part)
     job = {"version": 1, "method": "surface", "tolerance": 0.2, "align": "none", "repair": "pymeshfix"}
     result = damageest.run(job, part=part, scan=scan)
     assert result.truth is not None

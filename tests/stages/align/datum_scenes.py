@@ -36,7 +36,7 @@ class Scene:
         )
 
 
-def scan_part(part: Part, depth: Floats | float = 0.0, points: int = 12_000, seed: int = 0) -> Scene:
+def scan_part(part: Part, depth: Floats | float = 0.0, points: int = 6000, seed: int = 0) -> Scene:
     """A scan in the part's frame. ``depth`` (F,): how deep each triangle is worn, in tolerances."""
     rng = np.random.default_rng(seed)
     noise = NOISE * part.diagonal
@@ -109,7 +109,7 @@ def choose_datums(part: Part, first: int) -> dict[str, list[int]]:
     return chosen
 
 
-def make_worn(name: str, first: int) -> tuple[Scene, dict[str, list[int]]]:
+def make_worn(name: str, first: int, points: int = 60_000) -> tuple[Scene, dict[str, list[int]]]:
     """A part with each face worn by 1 to 4 tolerances but for its datums, and these."""
     part = number_faces(PARTS[name]())
     datums = choose_datums(part, first)
@@ -117,4 +117,4 @@ def make_worn(name: str, first: int) -> tuple[Scene, dict[str, list[int]]]:
     depth = np.random.default_rng(first).uniform(1, 4, int(part.faces_brep.max()) + 1)
     depth[[face for faces in datums.values() for face in faces]] = 0
     numbers: Ints = part.faces_brep
-    return scan_part(part, depth[numbers], 60_000, first), datums
+    return scan_part(part, depth[numbers], points, first), datums

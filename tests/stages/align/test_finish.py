@@ -36,7 +36,7 @@ MAKERS = {
 @cache
 def scan_worn(kind: str, part: str, amount: float) -> tuple[Part, Scan, float]:
     """A part, a scan of it in its own frame, and the tolerance."""
-    case = Scanning(part, 0, points=20_000, amount=amount)
+    case = Scanning(part, 0, points=10_000, amount=amount)
     scene = MAKERS[kind](case) if kind in MAKERS else case.scan(case.part, None)
     return case.part, Scan(scene.points, noise=case.noise), case.tolerance
 

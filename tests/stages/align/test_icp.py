@@ -22,7 +22,7 @@ def near(part: Part, scan: Scan, degrees: float, shift: float) -> list[list[floa
     return np.asarray(D @ scan.truth.T_part_scan).tolist()
 
 
-@pytest.mark.parametrize("name", ["block", "blade"])
+@pytest.mark.parametrize("name", ["block", pytest.param("blade", marks=pytest.mark.slow)])
 def test_damage_does_not_shift_the_fit(name: str) -> None:
     part, scan = scene(name, seed=1, missing=0.33)
     stage = Icp.model_validate({"T_part_scan": near(part, scan, 1.0, 0.004)})

@@ -26,6 +26,7 @@ def mirror(scan: Scan) -> Scan:
     return Scan(scan.points * [1, 1, -1], noise=scan.noise)
 
 
+@pytest.mark.slow
 def test_the_waves_of_a_camera_are_no_mirror_image() -> None:
     part = make_bracket()
     scan, _ = watch_by_camera(part, 302, 7004, 0.5)
@@ -42,7 +43,7 @@ def test_a_strip_of_a_mirror_image_is_not_refused() -> None:
 
 def test_a_mirror_image_in_a_given_pose_is_refused() -> None:
     """The pose is the one in which most of it lies on the part; part of what is mirrored lies outside."""
-    part, scan = scene("block", 50, points=20_000)
+    part, scan = scene("block", 50, points=8000)
     assert scan.truth is not None
     aligned = mirror(scan.move(scan.truth.T_part_scan))
     with pytest.raises(StageError, match="mirror image"):

@@ -24,6 +24,7 @@ def is_told(part: Part, scan: Scan, pose: Pose) -> bool:
     return bool(pose.doubts) and min((measure_apart(part, T, scan) for T in others), default=1.0) < RIGHT
 
 
+@pytest.mark.slow
 def test_a_camera_does_not_show_which_hole_is_larger() -> None:
     """A pose that is turned by 180 degrees was taken, without a doubt."""
     part = make_plate(0.6)
@@ -33,6 +34,7 @@ def test_a_camera_does_not_show_which_hole_is_larger() -> None:
     assert "other_poses" in [doubt.code for doubt in pose.doubts]
 
 
+@pytest.mark.slow
 def test_a_fine_scan_shows_it() -> None:
     part = make_plate()
     T = np.eye(4)

@@ -72,7 +72,7 @@ def make_case(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
 
 # every ninth one of the first fifty by default; the others by -m slow
 @pytest.mark.parametrize(
-    "seed", [pytest.param(seed, marks=pytest.mark.slow) if seed % 9 or seed > 50 else seed for seed in range(CASES)]
+    "seed", [pytest.param(seed, marks=pytest.mark.slow) if seed % 9 or seed > 40 else seed for seed in range(CASES)]
 )
 def test_guarantees(seed: int) -> None:
     part, lost, chosen, deposit = make_case(seed)
@@ -104,10 +104,10 @@ POSE[:3, :3] = Rotation.from_euler("xyz", (20, -50, 130), degrees=True).as_matri
 POSE[:3, 3] = (130, -50, 290)
 
 
-# four of 120 had edges of four triangles; these are among them
+# four of 120 had edges of four triangles; they are among 3, 10, 38, 50, 67, 79, of which two are by default
 @pytest.mark.parametrize(
     "seed",
-    [pytest.param(seed, marks=[] if seed in (3, 10, 38, 50, 67, 79) else pytest.mark.slow) for seed in range(120)],
+    [pytest.param(seed, marks=[] if seed in (10, 50) else pytest.mark.slow) for seed in range(120)],
 )
 def test_a_reader_that_merges_vertices_finds_it_closed(seed: int, tmp_path: Path) -> None:
     """Written as the stage `export` writes it, in the part's frame and in that of a scan."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import jsonschema
 import pytest
 
 from damageest.errors import JobError
@@ -14,6 +13,7 @@ from damageest.registry import Registry
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance.milling import Milling
 from tests import damaged_box
+from tests.needs import import_or_skip
 
 VALID = """
 allowance:
@@ -38,6 +38,7 @@ def test_a_valid_job(tmp_path: Path) -> None:
     stage = job.stages[Allowance]
     assert isinstance(stage, Milling)
     assert stage.keep_out[1].mesh == tmp_path / "box.stl"
+    jsonschema = import_or_skip("jsonschema")
     schema = jsonschema.Draft202012Validator(job_schema(Registry.discover()))
     schema.validate(yamlfile.read(path)[0])
     schema.validate(job.to_values(tmp_path))

@@ -27,7 +27,9 @@ def test_holds_a_block_of_any_shape() -> None:
         assert nearest > 0.9
 
 
-@pytest.mark.parametrize("how", ["linear", "loop", "butterfly", "adaptive"])
+@pytest.mark.parametrize(
+    "how", ["loop", "adaptive", *(pytest.param(how, marks=pytest.mark.slow) for how in ("linear", "butterfly"))]
+)
 def test_every_subdivision_holds_the_part(how: str) -> None:
     """A capsule has no sharp corners, so the smoothing subdivisions keep its shape."""
     found = Capsule.model_validate({"use": "capsule", "subdivide": how}).run(box(), dent(), 0.5, 0.1, True)

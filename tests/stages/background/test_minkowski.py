@@ -12,7 +12,7 @@ from damageest.stages.background.minkowski import Minkowski
 from tests.stages.background.holding import box, dent, measure_gap
 
 
-@pytest.mark.parametrize("name", ["grille", "gear", "tube"])
+@pytest.mark.parametrize("name", ["tube", *(pytest.param(name, marks=pytest.mark.slow) for name in ("grille", "gear"))])
 def test_everywhere_at_the_clearance(name: str) -> None:
     part = PARTS[name]()
     tolerance = 0.004 * part.diagonal

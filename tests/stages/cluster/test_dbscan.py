@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from sklearn.cluster import DBSCAN
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan
 from damageest.stages.cluster import _density
 from damageest.stages.cluster._density import run_dbscan
 from damageest.stages.cluster.dbscan import Dbscan, find_sharpest_bend
+from tests.needs import import_or_skip
 
 SIZE = 60.0
 SIGMA = 0.04
@@ -97,7 +97,8 @@ def test_sharpest_bend() -> None:
 def test_same_clusters_as_scikit_learn() -> None:
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(c, 0.5, (300, 3)) for c in (0, 4, 8)] + [rng.uniform(-5, 12, (200, 3))])
-    ours, theirs = run_dbscan(points, 0.5, 8), DBSCAN(eps=0.5, min_samples=8, algorithm="kd_tree").fit(points)
+    reference = import_or_skip("sklearn.cluster").DBSCAN(eps=0.5, min_samples=8, algorithm="kd_tree")
+    ours, theirs = run_dbscan(points, 0.5, 8), reference.fit(points)
     assert np.array_equal(ours < 0, theirs.labels_ < 0)
     core = theirs.core_sample_indices_
     assert len(np.unique(np.stack([ours[core], theirs.labels_[core]]), axis=1).T) == len(

@@ -36,10 +36,10 @@ def intersect_pieces(case: Scene, enclosures: Enclosures) -> list[object]:
     ("name", "least"),
     [
         ("pit", 0.97),
-        ("edge", 0.97),
+        pytest.param("edge", 0.97, marks=pytest.mark.slow),
         ("deep hole", 0.95),
-        ("end", 0.985),
-        ("beside the bore", 0.96),
+        pytest.param("end", 0.985, marks=pytest.mark.slow),
+        pytest.param("beside the bore", 0.96, marks=pytest.mark.slow),
         ("worn through", 0.95),
         ("two", 0.95),
     ],
@@ -82,6 +82,7 @@ def test_the_same_input_gives_the_same_bytes() -> None:
     assert first.solid.faces.tobytes() == again.solid.faces.tobytes()
 
 
+@pytest.mark.slow
 def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_a_note_says_so() -> None:
     case = scene("end")
     (item,) = enclose_with(case, Implicit(most_cells=60_000)).items
@@ -114,6 +115,7 @@ def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
     assert (item.solid.bounds[1] < case.truth.bounds[1] + reach).all()
 
 
+@pytest.mark.slow
 def test_more_points_give_a_better_surface_where_it_is_curved() -> None:
     """Points are left out where they show that the surface is flat. Curvature below the noise of a single point shows
     in a dense scan."""
@@ -127,6 +129,7 @@ def test_more_points_give_a_better_surface_where_it_is_curved() -> None:
     assert errors[0] < 0.5 * errors[1]
 
 
+@pytest.mark.slow
 def test_skin_samples_reach_as_far_as_the_grid_does() -> None:
     case, wide = scene("edge"), Implicit(margin=60)
     nearby = sample_near_damage(**case.inputs(), encloser_at_once=wide)

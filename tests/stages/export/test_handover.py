@@ -7,7 +7,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import lib3mf
 import numpy as np
 import pytest
 import trimesh
@@ -23,6 +22,7 @@ from damageest.registry import Registry
 from damageest.result import Result
 from damageest.stages.export._colours import DAMAGE, DEPOSIT, UNDAMAGED
 from damageest.stages.export.files import Files
+from tests.needs import import_or_skip
 from tests.stages.export import results
 
 
@@ -33,7 +33,7 @@ def write(result: Result, folder: Path, registry: Registry, **options: Any) -> A
 
 def opened(path: Path) -> tuple[str, dict[str, tuple[trimesh.Trimesh, str]]]:
     """By lib3mf: the unit in the model, and each item of the build by its name: mesh and colour."""
-    model = lib3mf.get_wrapper().CreateModel()
+    model = import_or_skip("lib3mf").get_wrapper().CreateModel()
     reader = model.QueryReader("3mf")
     reader.SetStrictModeActive(True)
     reader.ReadFromFile(str(path))
@@ -215,7 +215,9 @@ def test_a_format_of_a_plugin_that_is_not_there_names_it(job_file: Any, registry
     from dataclasses import replace
 
     own = replace(registry, writers={name: w for name, w in registry.writers.items() if name != "step"})
-    with pytest.raises(JobError, match=r"'step' needs the plugin damageest-cadquery.*(pip|apt-get) install"):
+    with pytest.raises(
+        JobError, match=r"'step' needs the plugin damageest-cadquery.*(pip install|uv sync|apt-get install)"
+    ):
         load(job_file("export: {format: [stl, step]}\n"), own)
     with pytest.raises(JobError, match="a spline needs the plugin damageest-cadquery"):
         load(job_file("export: {spline: true}\n"), own)

@@ -53,7 +53,7 @@ def test_volumes_and_unit(units: str, detail: float | None, tmp_path: Path, regi
     assert (box.xmax, box.ymax, box.zmax) == pytest.approx(high, abs=1e-4)
 
 
-@pytest.mark.parametrize("units", ["mm", "in"])
+@pytest.mark.parametrize("units", ["in", pytest.param("mm", marks=pytest.mark.slow)])
 def test_inner_damage_surfaces_as_splines(units: str, tmp_path: Path, registry: Registry) -> None:
     scale = MILLIMETRES[units]
     result = results.make(units, 1 / scale)

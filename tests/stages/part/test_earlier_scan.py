@@ -17,7 +17,8 @@ from damageest.result import Result
 from damageest.stages.part.earlier_scan import EarlierScan
 
 CHIP = (BALL, 5, (20, 15, 10))
-FEW: dict[str, Any] = {"before": EARLY, "after": LATE, "first": (20_000, 0.03), "second": (16_000, 0.04)}
+USUAL: dict[str, Any] = {"before": EARLY, "after": LATE, "first": (20_000, 0.03), "second": (16_000, 0.04)}
+FEW = USUAL | {"first": (8000, 0.03), "second": (6000, 0.04)}
 
 
 def compare(folder: Path, drawn: DrawnPair, before: Floats | None = None, **job: Any) -> Result:
@@ -27,8 +28,9 @@ def compare(folder: Path, drawn: DrawnPair, before: Floats | None = None, **job:
     return damageest.run({"version": 1, "part": part, "scan": str(folder / "after.npy"), **job})
 
 
+@pytest.mark.slow
 def test_a_chip_between_two_partial_scans_in_other_poses_has_its_volume(tmp_path: Path) -> None:
-    drawn = draw_pair(Pair("", "block", CHIP, **FEW), 1)
+    drawn = draw_pair(Pair("", "block", CHIP, **USUAL), 1)
     result = compare(tmp_path, drawn)
     (site,) = result.sites
     low, high = site.volume_95 or (0.0, 0.0)
@@ -42,8 +44,9 @@ def test_a_chip_between_two_partial_scans_in_other_poses_has_its_volume(tmp_path
     assert result.coverage.seen > 0.85  # of the skin that the earlier scan shows
 
 
+@pytest.mark.slow
 def test_where_nothing_changed_nothing_is_found(tmp_path: Path) -> None:
-    result = compare(tmp_path, draw_pair(Pair("", "bracket", **FEW), 2))
+    result = compare(tmp_path, draw_pair(Pair("", "bracket", **USUAL), 2))
     assert result.status == "ok"
     assert not [site for site in result.sites if site.accepted]
     assert result.damage_volume == 0

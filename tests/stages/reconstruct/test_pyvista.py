@@ -10,6 +10,8 @@ from damageest.artefacts import Part, Surface
 from damageest.errors import StageError
 from damageest.stages.reconstruct.pyvista import PyVista
 
+pytestmark = pytest.mark.needs("pyvista")
+
 RADIUS, TOP, NOISE, TOLERANCE = 6.0, 10.0, 0.05, 0.2
 
 

@@ -55,18 +55,24 @@ def test_too_few_points_are_refused() -> None:
     assert caught.value.remedy
 
 
-@pytest.mark.parametrize("density", [pytest.param(0.0, marks=pytest.mark.slow), 0.8])
+PIT = {"tool": "sphere", "centre": [0, 0, 10], "radius": 6}
+CUT = {"tool": "box", "centre": [20, 15, 10], "size": [14, 12, 10], "rotation": [0, 0, 20]}
+BLOB = {"tool": "blob", "centre": [18, 0, 10], "radius": 7, "seed": 2}
+
+
 @pytest.mark.parametrize(
-    "tool",
+    ("tool", "density", "points"),
     [
-        {"tool": "sphere", "centre": [0, 0, 10], "radius": 6},
-        {"tool": "box", "centre": [20, 15, 10], "size": [14, 12, 10], "rotation": [0, 0, 20]},
-        {"tool": "blob", "centre": [18, 0, 10], "radius": 7, "seed": 2},
+        (PIT, 0.8, 25_000),
+        *(
+            pytest.param(tool, density, 60_000, marks=pytest.mark.slow)
+            for tool in (PIT, CUT, BLOB)
+            for density in (0.0, 0.8)
+        ),
     ],
-    ids=["pit", "cut", "blob"],
 )
-def test_jobs_with_it_find_the_damage(tool: dict, density: float) -> None:
-    scan = {"use": "simulate", "points": 60_000, "density": density, "damage": [tool]}
+def test_jobs_with_it_find_the_damage(tool: dict, density: float, points: int) -> None:
+    scan = {"use": "simulate", "points": points, "density": density, "damage": [tool]}
     job = {"version": 1, "tolerance": 0.15, "method": "surface", "align": "none", "reconstruct": "signed_distance"}
     result = damageest.run({**job, "part": box(), "scan": scan})
     assert result.truth[1] > 0.97

@@ -15,7 +15,6 @@ import damageest
 from damageest.artefacts import Pose, Reason
 from damageest.findings import Verdict
 from damageest.stages.report.html import Html
-from tests import damaged_box
 from tests.path_shapes import dent, plan
 from tests.stages.report import pages
 
@@ -46,15 +45,20 @@ class Page(HTMLParser):
 
 
 @pytest.fixture(scope="module")
-def page() -> Page:
-    return Page(pages.write(pages.two_sites()).read_text())
+def text() -> str:
+    return pages.write(pages.two_sites()).read_text()
 
 
-def test_it_needs_no_other_file(page: Page) -> None:
+@pytest.fixture(scope="module")
+def page(text: str) -> Page:
+    return Page(text)
+
+
+def test_it_needs_no_other_file(page: Page, text: str) -> None:
     for tag, attributes in page.tags:
         for name in ("src", "href", "xlink:href", "action", "data"):
             assert attributes.get(name, "#").startswith(("#", "data:")), (tag, attributes)
-    style = pages.write(pages.two_sites()).read_text().split("<style>")[1].split("</style>")[0]
+    style = text.split("<style>")[1].split("</style>")[0]
     assert "@import" not in style
     assert "url(" not in style
 
@@ -98,13 +102,12 @@ def test_ids_are_given_once(page: Page) -> None:
     assert len(ids) == len(set(ids))
 
 
-def test_same_bytes_twice_but_for_dates() -> None:
-    first, second = (pages.write(pages.two_sites()).read_text() for _ in range(2))
-    assert DATES.sub("", first) == DATES.sub("", second)
-    assert len(DATES.findall(first)) == 1
+def test_same_bytes_twice_but_for_dates(text: str) -> None:
+    assert DATES.sub("", text) == DATES.sub("", pages.write(pages.two_sites()).read_text())
+    assert len(DATES.findall(text)) == 1
 
 
-def test_markup_in_names_and_messages_does_no_harm(tmp_path: Path) -> None:
+def test_markup_in_names_and_messages_does_no_harm(tmp_path: Path, page: Page) -> None:
     nasty, result = pages.NASTY, pages.two_sites()
     sites = tuple(
         replace(s, verdict=Verdict("doubtful", (Reason("pose", nasty),)), warnings=(Reason("x", nasty),))
@@ -113,8 +116,7 @@ def test_markup_in_names_and_messages_does_no_harm(tmp_path: Path) -> None:
     part = replace(result.part, path=str(tmp_path / nasty.replace("/", "")), notes=(nasty,))
     told = replace(result, name=nasty, sites=sites, part=part, warnings=(Reason("x", nasty),), failures=(nasty,))
     text = pages.write(replace(told, pose=Pose(np.eye(4), notes=(nasty,))), job_text=nasty).read_text()
-    plain = Page(pages.write(result).read_text())
-    count = {tag: sum(t == tag for t, _ in plain.tags) for tag in ("script", "img")}
+    count = {tag: sum(t == tag for t, _ in page.tags) for tag in ("script", "img")}
     found = Page(text)
     assert {tag: sum(t == tag for t, _ in found.tags) for tag in count} == count
     assert not [a for _, a in found.tags if any(name.startswith("on") for name in a)]
@@ -141,22 +143,22 @@ def test_many_points_and_triangles_stay_small() -> None:
     assert 1000 < int(shown[1]) <= 2000
 
 
-def test_the_run_writes_it_and_names_it(tmp_path: Path) -> None:
-    path = damaged_box.write(tmp_path)
-    result = damageest.run(path, output=tmp_path / "out", settings=["report=html"])
-    assert (tmp_path / "out/report.html").stat().st_size > 1e6
-    assert '"report.html"' in (tmp_path / "out/result.json").read_text()
+def test_the_run_writes_it_and_names_it(small_done: Path) -> None:
+    out = small_done.parent / "out/job"
+    result = damageest.run(small_done, output=True, settings=["report=html"])
+    assert (out / "report.html").stat().st_size > 1e6
+    assert '"report.html"' in (out / "result.json").read_text()
     assert [record.use for record in result.stages][-1] == "html"
-    damageest.run(path, output=tmp_path / "out")
-    assert not (tmp_path / "out/report.html").exists()
+    damageest.run(small_done, output=True)
+    assert not (out / "report.html").exists()
 
 
-def test_a_report_that_fails_is_a_warning(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_report_that_fails_is_a_warning(small_done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise ValueError("no such colour")
 
     monkeypatch.setattr("damageest.stages.report._scene.build_scene", fail)
-    result = damageest.run(damaged_box.write(tmp_path), output=tmp_path / "out", settings=["report=html"])
+    result = damageest.run(small_done, output=True, settings=["report=html"])
+    written = small_done.parent / "out/job/result.json"
     assert [note for note in result.warnings if note.code == "report" and "no such colour" in note.text]
-    assert (tmp_path / "out/result.json").is_file()
-    assert "no such colour" in (tmp_path / "out/result.json").read_text()
+    assert "no such colour" in written.read_text()

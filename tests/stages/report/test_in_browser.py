@@ -56,10 +56,12 @@ def check_drawn(report: browser.Shown) -> None:
     report.page.close()
 
 
+@pytest.mark.slow
 def test_no_fault_and_no_request(shown: browser.Shown) -> None:
     assert not shown.faults
 
 
+@pytest.mark.slow
 def test_no_other_script_runs_and_nothing_is_fetched(chromium: Any) -> None:
     """What a text of a plugin could bring into the page: a script, a handler, a picture from elsewhere."""
     path = pages.write(pages.two_sites())
@@ -86,14 +88,17 @@ def test_each_layer_draws_and_switches(shown: browser.Shown) -> None:
     assert count_changed(empty, shown.picture()) < 20
     shown.switch("part", True)
     shown.switch("damage", True)
+    assert not shown.faults
 
 
+@pytest.mark.slow
 def test_the_colour_bar_comes_with_the_scan(shown: browser.Shown) -> None:
     for on in (True, False):
         shown.switch("scan", on)
         assert shown.page.is_visible("#scale") == on
 
 
+@pytest.mark.slow
 def test_a_site_can_be_hidden(shown: browser.Shown) -> None:
     before = shown.picture()
     shown.page.uncheck("input.site[data-site='1']")
@@ -102,6 +107,7 @@ def test_a_site_can_be_hidden(shown: browser.Shown) -> None:
     shown.page.check("input.site[data-site='1']")
 
 
+@pytest.mark.slow
 def test_a_click_on_a_row_flies_to_the_site(shown: browser.Shown) -> None:
     result = pages.two_sites()
     for site in result.sites:
@@ -118,6 +124,7 @@ def test_a_click_on_a_row_flies_to_the_site(shown: browser.Shown) -> None:
     assert shown.camera()[3:] == pytest.approx(np.zeros(3), abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_click_on_a_site_shows_its_row(shown: browser.Shown) -> None:
     shown.page.click("#row-1 td:nth-child(3)")  # the site is now in the middle of the picture
     shown.settle()
@@ -130,6 +137,7 @@ def test_a_click_on_a_site_shows_its_row(shown: browser.Shown) -> None:
     shown.page.click("#fit")
 
 
+@pytest.mark.slow
 def test_the_plane_clips(shown: browser.Shown) -> None:
     shown.page.select_option("#clip-axis", "2")
     shown.settle()
@@ -140,6 +148,7 @@ def test_the_plane_clips(shown: browser.Shown) -> None:
     assert count_changed(half, shown.picture()) > 200
 
 
+@pytest.mark.slow
 def test_a_section_has_outline_and_points(shown: browser.Shown) -> None:
     for site in (1, 2):
         for name in (
@@ -179,6 +188,7 @@ def test_in_the_dark_on_a_tablet_and_on_paper(chromium: Any) -> None:
     report.page.close()
 
 
+@pytest.mark.slow
 def test_the_form_is_exaggerated_by_a_slider(chromium: Any) -> None:
     report = browser.Shown(chromium, pages.write(pages.sheared()))
     slider = report.page.locator("#exaggerate")

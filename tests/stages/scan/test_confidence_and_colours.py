@@ -122,8 +122,8 @@ def test_colours_and_confidence_are_in_the_scan_that_is_written(tmp_path: Path) 
         "scan": {"path": [str(tmp_path / f"{k}.ply") for k in "ab"], "crop": crop},
     }
     kept = points[:, 2] > -5
+    out = tmp_path / "out"  # the second run takes the kept stages of the first
     for choice, names in (("label", ("scan_red", "scan_green", "scan_blue")), ("scan", ("red", "green", "blue"))):
-        out = tmp_path / choice
         damageest.run(job | {"export": {"point_colours": choice}}, output=out)
         table = read_table(out / "scan.ply")
         assert (np.stack([table[axis] for axis in "xyz"], axis=1) == points[kept]).all()

@@ -117,7 +117,14 @@ def test_single_precision_formats_keep_single_precision(name, points, tmp_path):
         np.testing.assert_array_equal(read_points(path).points, single)
 
 
-@pytest.mark.parametrize("suffix", sorted(READERS))
+PACKAGES = {".e57": "pye57", ".vtk": "pyvista", ".vtp": "pyvista", ".vtu": "pyvista"}
+SUFFIXES = [
+    pytest.param(name, marks=pytest.mark.needs(PACKAGES[name])) if name in PACKAGES else name
+    for name in sorted(READERS)
+]
+
+
+@pytest.mark.parametrize("suffix", SUFFIXES)
 @given(garbage=st.binary(max_size=300))
 @quick
 def test_garbage_is_refused_by_name_or_read_as_numbers(suffix, garbage, tmp_path):

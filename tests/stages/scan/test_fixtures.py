@@ -20,9 +20,10 @@ DOTS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("scene", "seed"),
-    [pytest.param({}, 2, marks=pytest.mark.slow), ({"surroundings": CLAMPS, "added": DOTS}, 0)],
+    [({}, 2), ({"surroundings": CLAMPS, "added": DOTS}, 0)],
     ids=["table", "table, clamps and dots"],
 )
 def test_the_loss_is_right_beside_fixtures(scene: dict[str, Any], seed: int) -> None:

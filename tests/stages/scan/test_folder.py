@@ -11,6 +11,7 @@ import trimesh
 import damageest
 from damageest.errors import InputError, JobError
 from damageest.io.meshes import write_points
+from damageest.result import Result
 from damageest.stages.scan.file import ScanFile
 from tests import damaged_box
 from tests.stages.scan.test_file_views import write_e57
@@ -31,13 +32,23 @@ def write_patches(folder: Path) -> np.ndarray:
     return points
 
 
-def test_the_patches_of_a_folder_are_one_scan(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def read_twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[np.ndarray, Result, Result]:
+    """The points of a folder, its result, and that of the folder without one of its patches."""
+    tmp_path = tmp_path_factory.mktemp("folder")
     points = write_patches(tmp_path / "patches")
     (tmp_path / "patches/.hidden.ply").write_bytes(b"no scan")
     (tmp_path / "patches/inner").mkdir()
     (tmp_path / "patches/inner/5.xyz").write_text("0 0 500\n")
     (tmp_path / "patches/project.raw").write_bytes(b"of a scanner")
-    done = damageest.run(JOB | {"part": str(tmp_path / "box.stl"), "scan": str(tmp_path / "patches")})
+    job = JOB | {"part": str(tmp_path / "box.stl"), "scan": str(tmp_path / "patches")}
+    first = damageest.run(job, output=tmp_path / "out")
+    (tmp_path / "patches/2.xyz").unlink()
+    return points, first, damageest.run(job, output=tmp_path / "out")
+
+
+def test_the_patches_of_a_folder_are_one_scan(read_twice: tuple[np.ndarray, Result, Result]) -> None:
+    points, done, _ = read_twice
     assert done.scan.points == pytest.approx(points, abs=1e-5)
     assert [Path(path).name for path in done.scan.paths] == ["1.ply", "2.xyz", "3.npy", "4.glb"]
     assert done.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
@@ -46,12 +57,8 @@ def test_the_patches_of_a_folder_are_one_scan(tmp_path: Path) -> None:
     assert "project.raw" in warning.text
 
 
-def test_a_folder_is_read_again_when_a_patch_changes(tmp_path: Path) -> None:
-    write_patches(tmp_path / "patches")
-    job = JOB | {"part": str(tmp_path / "box.stl"), "scan": str(tmp_path / "patches")}
-    first = damageest.run(job, output=tmp_path / "out")
-    (tmp_path / "patches/2.xyz").unlink()
-    again = damageest.run(job, output=tmp_path / "out")
+def test_a_folder_is_read_again_when_a_patch_changes(read_twice: tuple[np.ndarray, Result, Result]) -> None:
+    _, first, again = read_twice
     assert len(first.scan.points) - len(again.scan.points) == 1500
 
 

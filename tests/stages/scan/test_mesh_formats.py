@@ -108,7 +108,9 @@ def test_nodes_of_a_scene_are_applied(tmp_path: Path, suffix: str) -> None:
     assert scan.points[order[0]] == pytest.approx(expected[order[1]], abs=1e-5)
 
 
-@pytest.mark.parametrize("suffix", ["ply", "stl", "obj", "vtp", "vtk", "glb"])
+@pytest.mark.parametrize(
+    "suffix", ["ply", "glb", *(pytest.param(suffix, marks=pytest.mark.slow) for suffix in ("stl", "obj", "vtp", "vtk"))]
+)
 def test_a_mesh_with_holes_and_edges_of_three_triangles_is_a_scan(tmp_path: Path, suffix: str) -> None:
     trimesh.creation.box(damaged_box.SIZE).export(tmp_path / "box.stl")
     path, unit = tmp_path / f"a.{suffix}", "m" if suffix == "glb" else "mm"

@@ -23,6 +23,20 @@ def split_words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
+def prepare_places(out: Path | None, write: Path | None = None, marks: str = "") -> None:
+    """Makes the folder ``out``, and finds the ``marks`` in the file ``write``: what is wrong with them is said before
+    the runs. Raises JobError or InputError."""
+    from damageest.io.files import check_output_file, check_output_folder
+    from damageest_evaluate.readme import replace_between_marks
+
+    if write:
+        replace_between_marks(write, None, marks)
+        check_output_file(write, "--write")
+    if out:
+        check_output_folder(out, "--out")
+        out.mkdir(parents=True, exist_ok=True)
+
+
 def run_counted(
     cases: Sequence[EvaluationCase],
     out: Path | None,
@@ -33,8 +47,7 @@ def run_counted(
     scheduler: str = "",
 ) -> list[Row]:
     """The rows of all cases, which the file ``name`` in the folder ``out`` keeps; each is told with its number."""
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
+    prepare_places(out)
     count = 0
 
     def print_row(row: Row) -> None:

@@ -29,9 +29,16 @@ def command(
     from damageest.errors import InputError, suggest
     from damageest.registry import Registry
     from damageest_evaluate.budget import PARTS, make_budget_cases, make_budget_table
-    from damageest_evaluate.commands._counted import format_command, run_counted, show_report, split_words
+    from damageest_evaluate.commands._counted import (
+        format_command,
+        prepare_places,
+        run_counted,
+        show_report,
+        split_words,
+    )
     from damageest_evaluate.job import fingerprint_code
 
+    prepare_places(out, write, "budget")
     names = split_words(parts) or list(PARTS)
     for name in names:
         if name not in PARTS:

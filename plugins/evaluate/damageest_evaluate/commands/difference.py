@@ -31,6 +31,7 @@ def command(
     from damageest_evaluate.commands._counted import (
         format_command,
         parse_numbers,
+        prepare_places,
         run_counted,
         show_report,
         split_words,
@@ -38,6 +39,7 @@ def command(
     from damageest_evaluate.differences import describe_difference, make_difference_cases, make_difference_table
     from damageest_evaluate.job import fingerprint_code
 
+    prepare_places(out, write, "difference")
     numbers = parse_numbers("--seeds", seeds)
     cases = make_difference_cases(numbers, split_words(pairs), fingerprint_code(Registry.discover()))
     rows = run_counted(cases, out, "difference.jsonl", workers, timeout, describe_difference)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from damageest_evaluate.commands import adapt, budget, difference, honesty, path, prepare, realistic, speed, steady
-from damageest_evaluate.commands._counted import AsJson, format_command, show_table
+from damageest_evaluate.commands._counted import AsJson, format_command, prepare_places, show_table
 from damageest_evaluate.commands.intervals import run_intervals
 
 if TYPE_CHECKING:
@@ -101,8 +101,7 @@ def job_command(
     from damageest_evaluate.job import plan_study
     from damageest_evaluate.variants import VariationRequest
 
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
+    prepare_places(out)
     if scheduler and not out:
         raise InputError("--scheduler: give --out too, a folder that the cluster sees: the part is put there")
     request = VariationRequest(size, noise, points, tolerance, vary or (), settings or (), against or ())
@@ -177,10 +176,7 @@ def suite_command(
         run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, format_command(), scheduler,
             as_json)  # fmt: skip
         return
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
-    if write:
-        replace_between_marks(write, None, marks)  # fails before the runs start if the marks are missing
+    prepare_places(out, write, marks)
     if pose not in ("random", "identity"):
         raise InputError(f"--pose: '{pose}' is not valid; give random or identity")
     base = [f"method={method}", *(["align=none"] if pose == "identity" else [])]
@@ -247,8 +243,7 @@ def matrix_command(
     from damageest_evaluate.matrix import run_matrix
     from damageest_evaluate.readme import make_matrix_table, replace_between_marks
 
-    if write:
-        replace_between_marks(write, None, "matrix")  # fails before the runs start if the marks are missing
+    prepare_places(None, write, "matrix")
     cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
     show_table(make_matrix_table(cells), list(map(asdict, cells)), as_json)
     if write:

@@ -44,17 +44,16 @@ def command(
     from damageest_evaluate.commands._counted import (
         format_command,
         parse_numbers,
+        prepare_places,
         run_counted,
         show_report,
         split_words,
     )
     from damageest_evaluate.job import fingerprint_code
-    from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.troubles.report import describe_case, format_trouble_row, make_trouble_tables
     from damageest_evaluate.troubles.suite import make_trouble_cases
 
-    if write:
-        replace_between_marks(write, None, "honesty")  # fails before the runs start if the marks are missing
+    prepare_places(out, write, "honesty")
     source = fingerprint_code(Registry.discover())
     cases = make_trouble_cases(
         split_words(kinds),

@@ -8,7 +8,7 @@ from typing import Any
 
 import typer
 
-from damageest_evaluate.commands._counted import show_table
+from damageest_evaluate.commands._counted import prepare_places, show_table
 
 
 def run_intervals(
@@ -21,10 +21,7 @@ def run_intervals(
     from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.rows import run_all
 
-    if write:
-        replace_between_marks(write, None, marks)  # fails before the runs start if the marks are missing
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
+    prepare_places(out, write, marks)
     planned = make_interval_cases(cases, seed, parts, Registry.discover())
     count = 0
 

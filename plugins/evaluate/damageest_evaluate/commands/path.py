@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from damageest_evaluate.commands._counted import AsJson, show_table, write_measured
+from damageest_evaluate.commands._counted import AsJson, prepare_places, show_table, write_measured
 
 
 def command(
@@ -40,10 +40,8 @@ def command(
     from damageest.registry import Registry
     from damageest_evaluate.paths.run import describe_row, make_demands, make_table, run_scenes
     from damageest_evaluate.paths.scenes import make_scenes
-    from damageest_evaluate.readme import replace_between_marks
 
-    if write:
-        replace_between_marks(write, None, "path")
+    prepare_places(out.parent if out else None, write, "path")
     scenes = make_scenes(jobs or [], each, random, part or [], Registry.discover())
     rows = []
     for row in run_scenes(scenes, out):

@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-from damageest_evaluate.commands._counted import AsJson, show_table, write_measured
+from damageest_evaluate.commands._counted import AsJson, prepare_places, show_table, write_measured
 
 
 def command(
@@ -24,10 +24,8 @@ def command(
     """Open ragged damages before deposition, and compare what a path of 3 axes reaches of them without and with it."""
     from damageest.registry import Registry
     from damageest_evaluate.paths.prepare import make_prepare_table, run_prepare
-    from damageest_evaluate.readme import replace_between_marks
 
-    if write:
-        replace_between_marks(write, None, "prepare")
+    prepare_places(out.parent if out else None, write, "prepare")
     rows = []
     for row in run_prepare(count, Registry.discover(), out):
         rows.append(row)

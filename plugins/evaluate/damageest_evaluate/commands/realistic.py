@@ -38,17 +38,17 @@ def command(
     from damageest_evaluate.commands._counted import (
         format_command,
         parse_numbers,
+        prepare_places,
         run_counted,
         show_report,
         split_words,
     )
     from damageest_evaluate.job import fingerprint_code
-    from damageest_evaluate.readme import replace_between_marks
     from damageest_evaluate.realistic.report import describe_case, format_realistic_row, make_realistic_report
     from damageest_evaluate.realistic.suite import make_realistic_cases
 
-    if write:
-        replace_between_marks(write, None, "realistic")  # fails before the runs start if the marks are missing
+    if not show:
+        prepare_places(out, write, "realistic")
     source = fingerprint_code(Registry.discover())
     numbers = parse_numbers("--case", case)
     cases = make_realistic_cases(split_words(sensors), split_words(parts), numbers, every, points, source)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands._counted import AsJson, show_table
+from damageest_evaluate.commands._counted import AsJson, prepare_places, show_table
 
 
 def command(
@@ -36,8 +36,7 @@ def command(
     from damageest_evaluate.rows import run_one
     from damageest_evaluate.speed import USUAL, make_speed_cases, make_speed_table
 
-    if write:
-        replace_between_marks(write, None, "speed")  # fails before the runs start if the marks are missing
+    prepare_places(None, write, "speed")
     try:
         count = int(float(points or 0))
     except (ValueError, OverflowError):

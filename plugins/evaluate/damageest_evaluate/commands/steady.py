@@ -24,7 +24,7 @@ def command(
     larger. The sites of the first run are looked for in the others.
     """
     from damageest.registry import Registry
-    from damageest_evaluate.commands._counted import parse_numbers
+    from damageest_evaluate.commands._counted import parse_numbers, prepare_places
     from damageest_evaluate.job import fingerprint_code
     from damageest_evaluate.readme import format_markdown
     from damageest_evaluate.rows import run_all
@@ -34,8 +34,7 @@ def command(
     source = fingerprint_code(Registry.discover())
     numbers = parse_numbers("--case", case) or list(NUMBERS)
     cases = [SteadyCase(**vars(one)) for one in make_trouble_cases(points=points, numbers=numbers, source=source)]
-    if out:
-        out.mkdir(parents=True, exist_ok=True)
+    prepare_places(out)
 
     def print_row(row: dict[str, Any]) -> None:
         flips = [f"{one['draw']}: {one['before']} -> {one['after']}" for one in row["sites"]]

@@ -13,6 +13,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.errors import StageError
+from damageest_machines.definition import Machine
 from damageest_machines.frames import read_angles
 from damageest_machines.post import Post, format_words
 
@@ -23,6 +24,14 @@ class Krl(Post):
     suffix = "src"
     serves = "robot"
 
+    @classmethod
+    def check_machine(cls, machine: Machine) -> None:
+        """Refuses a machine that does not say how its program begins."""
+        if "A1" not in machine.home and not machine.post.configuration:
+            raise StageError(
+                "a KRL program has to begin with known axes", "home (A1 to A6) or post.configuration (S 2,T 35)"
+            )
+
     def begin(self) -> list[str]:
         machine, number = self.machine, self.machine.frames.work.number
         lines = [f"DEF {self.program.name}( )", *self.describe(), "BAS(#INITMOV,0)"]
@@ -32,10 +41,6 @@ class Krl(Post):
             lines.append(f"$BASE={self._frame(self.at.base)}")
         lines += [f"$TOOL={self._frame(self.at.tool)}", "$IPO_MODE=#BASE", "$ORI_TYPE=#VAR"]
         lines += [f"$APO.CDIS={machine.post.blend:.3f}", *self._home()]
-        if not self._home() and not machine.post.configuration:
-            raise StageError(
-                "a KRL program has to begin with known axes", "home (A1 to A6) or post.configuration (S 2,T 35)"
-            )
         self.turns = read_angles(self.at.frames) if self.at.frames is not None else np.empty((0, 3))
         return lines
 
