@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import settings
 
 import damageest
 from damageest.registry import Registry
@@ -18,6 +19,8 @@ from tests import damaged_box
 from tests.kept import keep
 
 pytest_plugins = ["tests.costs", "tests.lacking"]
+settings.register_profile("untimed", deadline=None)  # machines are noisy, and first calls compile
+settings.load_profile("untimed")
 
 
 @pytest.fixture(scope="session")

@@ -20,7 +20,7 @@ def join_room(lost: Any, left: Any, background: Solid, part: Part) -> Mesh:
     """The lost metal with the room up to the ``background`` that is nearer to it than to what is left.
 
     ``lost`` and ``left``: Manifolds relative to the middle of the part's bounds. What the background does not hold of
-    the lost metal is not in the result.
+    the lost metal is not in the result. Raises StageError where that is all of it.
     """
     origin = part.bounds.mean(axis=0)
     own, rest = (Mesh(*to_arrays(one, origin)) for one in (lost, left))
@@ -33,6 +33,8 @@ def join_room(lost: Any, left: Any, background: Solid, part: Part) -> Mesh:
         return np.asarray(np.maximum((signed_distance(points, own)[0] - to_left) / 2, 1.8 * cell - to_left))
 
     hold = to_manifold(background, origin)
+    if not (lost ^ hold).volume() > 0:
+        raise StageError("the background holds none of the lost metal", "background: minkowski", method="implicit")
     try:
         room = to_manifold(extract_contour(measure, low - cell, (nx, ny, nz), cell), origin)
     except StageError:  # narrower than the cells everywhere
