@@ -100,10 +100,11 @@ def _move_out(places: Floats, part: Part, clear: float) -> Floats:
     """
     at = places.copy()
     for _ in range(MOVES):
-        far = np.flatnonzero(signed_distance(at, part)[0] < 0.9 * clear)
+        distance, _ = signed_distance(at, part)
+        far = np.flatnonzero(distance < 0.9 * clear)
         if not len(far):
             break
-        distance, _ = signed_distance(at[far], part)
+        distance = distance[far]
         _, face, foot = closest_on_mesh(at[far], part)
         way = np.sign(distance)[:, None] * (at[far] - foot)
         flat = np.abs(distance) < 0.1 * clear  # too near for a direction
