@@ -65,7 +65,7 @@ def divide_part(part: Part, sheet: Sheet, intact: Floats, side: str, tolerance: 
 
 def thicken(sheet: Mesh, half: float) -> Mesh:
     """A closed mesh that has the sheet in its middle and is ``2 half`` thick."""
-    normals = _measure_vertex_normals(sheet)
+    normals = sheet.vertex_normals
     count = len(sheet.vertices)
     vertices = np.concatenate([sheet.vertices + half * normals, sheet.vertices - half * normals])
     faces = [sheet.faces, sheet.faces[:, ::-1] + count]
@@ -88,14 +88,6 @@ def _make_balls(places: Floats, radius: Floats) -> Any:
             kept.append(number)
     balls = [Manifold.sphere(float(radius[k]), 16).translate(tuple(places[k])) for k in kept]
     return Manifold.batch_boolean(balls or [Manifold()], OpType.Add)
-
-
-def _measure_vertex_normals(sheet: Mesh) -> Floats:
-    total = np.zeros_like(sheet.vertices)
-    unit = sheet.cross / np.maximum(np.linalg.norm(sheet.cross, axis=1), 1e-300)[:, None]
-    for corner in range(3):
-        np.add.at(total, sheet.faces[:, corner], unit)
-    return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1), 1e-300)[:, None])
 
 
 def _measure_sides(mesh: Mesh, sheet: Sheet, tolerance: float) -> tuple[float, float]:
