@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections import Counter
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -21,6 +22,24 @@ from tests.kept import keep
 pytest_plugins = ["tests.costs", "tests.lacking"]
 settings.register_profile("untimed", deadline=None)  # machines are noisy, and first calls compile
 settings.load_profile("untimed")
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a test marked ``variants(n, slow=m)`` those after the first n are slow, and of the slow ones those after the
+    first m nightly."""
+    seen: Counter[str] = Counter()
+    for item in items:
+        if (mark := item.get_closest_marker("variants")) is None:
+            continue
+        name = item.nodeid.partition("[")[0]
+        seen[name] += 1
+        if mark.args and seen[name] > mark.args[0]:
+            item.add_marker(pytest.mark.slow)
+        if item.get_closest_marker("slow") and "slow" in mark.kwargs:
+            seen[name + " slow"] += 1
+            if seen[name + " slow"] > mark.kwargs["slow"]:
+                item.add_marker(pytest.mark.nightly)
 
 
 @pytest.fixture(scope="session")

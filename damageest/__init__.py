@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from damageest.job import Job as Job
     from damageest.pipeline.prepare import read_inputs as read_inputs
     from damageest.pipeline.prepare import read_part as read_part
+    from damageest.pipeline.watch import MemoryCache as MemoryCache
+    from damageest.pipeline.watch import Progress as Progress
     from damageest.registry import Registry as Registry
     from damageest.registry.hookspecs import hookimpl as hookimpl
     from damageest.result import Result as Result
@@ -23,10 +25,29 @@ _PUBLIC = {
     "Job": "damageest.job",
     "read_inputs": "damageest.pipeline.prepare",
     "read_part": "damageest.pipeline.prepare",
+    "MemoryCache": "damageest.pipeline.watch",
+    "Progress": "damageest.pipeline.watch",
     "Registry": "damageest.registry",
     "Result": "damageest.result",
 }
-__all__ = ["Job", "Registry", "Result", "__version__", "batch", "hookimpl", "read_inputs", "read_part", "run"]
+__all__ = [
+    "Job",
+    "MemoryCache",
+    "Progress",
+    "Registry",
+    "Result",
+    "__version__",
+    "batch",
+    "hookimpl",
+    "read_inputs",
+    "read_part",
+    "run",
+]
+
+
+def __dir__() -> list[str]:
+    """The public names too, which are imported when they are first used."""
+    return sorted({*globals(), *__all__})
 
 
 def __getattr__(name: str) -> Any:

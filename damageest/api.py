@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import json
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from damageest.artefacts import Part, Scan
 from damageest.errors import InputError
 from damageest.io.files import resolve_path, working_folder
+from damageest.io.given import as_part, as_scan
 from damageest.io.part_store import use_part_store
 from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine, follow, start
+from damageest.pipeline.engine import Engine, Route, follow, start
+from damageest.pipeline.notebook import find_notebook
 from damageest.pipeline.routes import WRITE, route_of
 from damageest.pipeline.state import JobState
+from damageest.pipeline.watch import MemoryCache, Progress, Signal, Teller, cancel_with, keep_so_far
 from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
@@ -34,39 +36,83 @@ def run(
     part: Any = None,
     scan: Any = None,
     output: str | Path | bool = False,
-    settings: Sequence[str] = (),
-    cache: bool = True,
+    settings: Sequence[str] | Mapping[str, Any] = (),
+    cache: bool | MemoryCache = True,
     registry: Registry | None = None,
     limits: Limits | None = None,
+    progress: Callable[[Progress], object] | None = None,
+    cancel: Signal | None = None,
 ) -> Result:
     """Runs a job and gives its result; writes nothing unless ``output`` says where (True: where the job says).
 
-    ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (a Part, a trimesh.Trimesh, or vertices and
-    faces) and ``scan`` (a Scan, an (N,3) array, a trimesh mesh or point cloud) replace the job's files; both may
-    also be in the mapping. ``settings`` are overrides such as ``"cluster.eps=0.4"``. Lengths are in the job's unit.
+    ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (`damageest.io.given.PARTS`: of numpy,
+    trimesh, PyVista, Open3D) and ``scan`` (`damageest.io.given.SCANS`) replace the job's files; both may also be in the
+    mapping. ``settings`` are overrides: ``["cluster.eps=0.4"]``, or ``{"cluster.eps": 0.4}``. Lengths are in the job's
+    unit. ``cache``: False computes all anew; a `MemoryCache` keeps what stages give from run to run, also without
+    files. ``progress`` is called in this thread when a stage or step begins; ``cancel``, as a `threading.Event`, ends
+    the run from another thread. In a notebook a run without ``progress`` shows it by itself.
     ``limits`` of memory and time hold for stages that run in a process of their own, those that call a native library.
     As long as it runs, the linear algebra of numpy and scipy uses one thread in this process, so that the same job
     gives the same bytes on any number of cores.
 
-    Raises JobError or InputError (job or input at fault) and StageError (a stage failed or refused).
+    Raises JobError or InputError (job or input at fault), StageError (a stage failed or refused) and CancelledError.
+    ``so_far`` of the error has what was computed before it.
     """
     registry, limits = registry or Registry.discover(), limits or Limits()
     if not isinstance(job, Job):
         source, given = _split(job, part, scan)
-        job = load(source, registry, settings, given)
-    with use_part_store(cache):
+        job = load(source, registry, list_settings(settings), given)
+    route = route_of(job.method) if output is False else (*route_of(job.method), *WRITE)
+    told = find_notebook() if progress is None else progress
+    teller = None if told is None else Teller(told, route)
+    with _observed(registry, teller), cancel_with(cancel):
+        result = _run(job, route, registry, limits, output, cache)
+    if teller is not None:
+        teller.finish()
+    return result
+
+
+def _run(
+    job: Job, route: Route, registry: Registry, limits: Limits, output: str | Path | bool, cache: bool | MemoryCache
+) -> Result:
+    with use_part_store(bool(cache)):
+        memory = cache if isinstance(cache, MemoryCache) else None
         if output is False:
-            engine = Engine(job, registry, limits=limits)
-            return follow(route_of(job.method), engine, start(engine)).result
+            engine = Engine(job, registry, memory, limits=limits)
+            with keep_so_far(engine):
+                return follow(route, engine, start(engine)).result
         target = job.output if output is True else resolve_path(Path(output), working_folder())
         job = replace(job, stages={contract: stage.leave_out(target) for contract, stage in job.stages.items()})
-        with open_workspace(target, cache) as place:
-            engine = Engine(job, registry, place.cache, limits=limits)
+        with open_workspace(target, bool(cache)) as place:
+            engine = Engine(job, registry, memory or place.cache, limits=limits)
             state = start(engine).with_value(JobState.folder, place.folder, digest(str(target)))
             state = state.with_value(JobState.target, target, digest(str(target)))
-            result = follow((*route_of(job.method), *WRITE), engine, state).result
+            with keep_so_far(engine):
+                result = follow(route, engine, state).result
             place.finish(engine.stems)
         return result
+
+
+@contextmanager
+def _observed(registry: Registry, teller: Teller | None) -> Iterator[None]:
+    """Lets a caller's observer hear of the run in the ``with`` block, and of no later one."""
+    if teller is None:
+        yield
+        return
+    registry.hooks.register(teller)
+    try:
+        yield
+    finally:
+        registry.hooks.unregister(teller)
+
+
+def list_settings(settings: Sequence[str] | Mapping[str, Any]) -> Sequence[str]:
+    """Overrides as the command line takes them. Raises InputError for a text, whose letters they would be."""
+    if isinstance(settings, str):
+        raise InputError(f'settings: give a list, as [{settings!r}], or a mapping, as {{"tolerance": 0.2}}')
+    if not isinstance(settings, Mapping):
+        return settings
+    return [f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in settings.items()]
 
 
 def _split(
@@ -83,9 +129,9 @@ def _split(
         scan = source.pop("scan") if scan is None and _is_data(source.get("scan")) else scan
     given: dict[Contract, Any] = {}
     if part is not None:
-        given[ReadPart] = _as_part(part, units)
+        given[ReadPart] = as_part(part, units)
     if scan is not None:
-        given[ReadScan] = _as_scan(scan, units)
+        given[ReadScan] = as_scan(scan, units)
     return source, given
 
 
@@ -93,26 +139,3 @@ def _is_data(value: Any) -> bool:
     """Whether a value of `part` or `scan` holds the data itself rather than the name of a file or an implementation."""
     names_files = isinstance(value, list) and all(isinstance(item, (str, Path)) for item in value)
     return not (value is None or isinstance(value, (str, Path, Mapping)) or names_files)
-
-
-def _as_part(value: Any, units: str) -> Part:
-    from damageest.geometry.make_part import make_part
-
-    if isinstance(value, Part):
-        return value
-    if hasattr(value, "vertices") and hasattr(value, "faces"):
-        value = (value.vertices, value.faces)
-    if not (isinstance(value, (tuple, list)) and len(value) == 2):
-        raise InputError(f"part: give a Part, a trimesh.Trimesh, or (vertices, faces); not a {type(value).__name__}")
-    return make_part(np.asarray(value[0], float), np.asarray(value[1], np.int64), unit=units)
-
-
-def _as_scan(value: Any, units: str) -> Scan:
-    if isinstance(value, Scan):
-        return value
-    points = np.asarray(getattr(value, "vertices", value), dtype=float)
-    if points.ndim != 2 or points.shape[1] != 3 or not len(points):
-        raise InputError(f"scan: give points of shape (N,3), N > 0; not {points.shape}")
-    if not np.isfinite(points).all():
-        raise InputError(f"scan: {int((~np.isfinite(points).all(1)).sum())} of its points are not finite; remove them")
-    return Scan(points, unit=units)

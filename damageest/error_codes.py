@@ -53,6 +53,12 @@ ERROR_CODES: dict[str, ErrorCode] = {
         "Do what the message says.",
         "docs/your-own-scan.md",
     ),
+    "cancelled": ErrorCode(
+        "the program that called damageest.run cancelled it",
+        1,
+        "Nothing: what stages had given is kept where the run had a cache or an output folder.",
+        "docs/python.md",
+    ),
     "output": ErrorCode(
         "the output folder cannot be written, is used by another run, or holds files of others",
         2,

@@ -15,6 +15,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 MOST_TEXT = 2000
 """Characters of a message from a plugin or a library that are shown; the rest is cut."""
@@ -57,6 +58,8 @@ class DamageestError(Exception):
     exit_status = 1
     topic = ""
     code = "unexpected"
+    so_far: Any = None
+    """What a run had computed before this ended it, a `damageest.result.SoFar`; None where it did not come from one."""
 
 
 @dataclass(frozen=True)
@@ -99,6 +102,15 @@ class InputError(DamageestError):
 
     def __init__(self, message: object = "", topic: str = "", code: str = "input") -> None:
         self.topic, self.code = topic, code
+        super().__init__(message)
+
+
+class CancelledError(DamageestError):
+    """The caller of `damageest.run` cancelled it."""
+
+    code = "cancelled"
+
+    def __init__(self, message: str = "the run was cancelled") -> None:
         super().__init__(message)
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -12,6 +14,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import (
     AdaptedPart,
+    Deposit,
     DepositPath,
     Deviation,
     Evidence,
@@ -37,8 +40,8 @@ class Site:
 
     After a cut-back alone, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and
     what to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices
-    into the scan; ``max_depth``: the farthest of them below the nominal surface. ``accepted``: whether the site is part
-    of `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
+    into the scan; ``max_depth``: the farthest of them below the lost skin. ``accepted``: whether the site is part of
+    `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
     unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
     that is a whole body of the part. ``path``: the passes that build up the deposit; None where
     the job asks for none, or none could be planned.
@@ -123,6 +126,22 @@ class StepRecord:
     seconds: float
 
 
+@dataclass(frozen=True, eq=False)
+class SoFar:
+    """What a run had computed when an error ended it; None for what it had not come to. As in `Result`; ``result`` is
+    whole where only files failed."""
+
+    part: Part | None = None
+    scan: Scan | None = None
+    aligned: Scan | None = None
+    pose: Pose | None = None
+    deviation: Deviation | None = None
+    tolerance: float | None = None
+    warnings: tuple[Reason, ...] = ()
+    result: Result | None = None
+    stages: tuple[StageRecord, ...] = ()
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """Everything a run computed. Lengths in ``units``; meshes in the part's frame.
@@ -182,6 +201,32 @@ class Result:
         return self.damage.volume if self.damage else 0.0
 
     @property
+    def cut_back_volume(self) -> float:
+        """Intact metal that is taken off before deposition, of all accepted sites: by a cut-back, or by `prepare`."""
+        return sum(deposit.cut_back_volume for deposit in self._list_deposits())
+
+    @property
+    def stock_volume(self) -> float:
+        """What the deposits of all accepted sites have beyond the part as designed."""
+        return sum(deposit.stock_volume for deposit in self._list_deposits())
+
+    @property
+    def lost_volume(self) -> float:
+        """The metal that is missing: ``damage_volume`` without the cut-back in it, where cavities are cut back."""
+        within = [one.cut_back_volume for one in self._list_deposits() if one.milled is None and one.cavity is not None]
+        return max(self.damage_volume - sum(within), 0.0)
+
+    def describe_volumes(self) -> str:
+        """Lost metal, cut-back and stock, each with its name, in ``units``; empty where there is only the first."""
+        cubic = f"{self.units}³"
+        more = [("cut-back", self.cut_back_volume), ("stock", self.stock_volume)]
+        told = [f"{name} {volume:.4g} {cubic}" for name, volume in more if volume > 0]
+        return f"lost metal {self.lost_volume:.4g} {cubic}, {', '.join(told)}" if told else ""
+
+    def _list_deposits(self) -> list[Deposit]:
+        return [one.deposit for one in self.sites if one.accepted and isinstance(one.deposit, Deposit)]
+
+    @property
     def undamaged_volume(self) -> float:
         return self.undamaged.volume if self.undamaged else 0.0
 
@@ -234,6 +279,28 @@ class Result:
             raise InputError(f"no plugin here converts a result to '{kind}'; there are: {known}")
         return self.conversions[kind](self, what, site)
 
+    def to_dict(self) -> dict[str, Any]:
+        """What ``result.json`` says of it, but for files and what only a run knows of them; see its schema."""
+        return dict(self.convert("dict", "result"))
+
+    def save(self, folder: str | Path) -> Path:
+        """Writes the whole result into a folder, with `to_dict` as ``result.json``; gives it. `load` reads it."""
+        from damageest.io.kept_values import keep_value
+
+        place = Path(folder)
+        keep_value(place, self, left_out=("conversions",))
+        (place / "result.json").write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
+        return place
+
+    @classmethod
+    def load(cls, folder: str | Path) -> Result:
+        """A result that `save` wrote. It converts to what trimesh and manifold3d take, not to what plugins make. Raises
+        InputError where there is none; a file cannot run code."""
+        from damageest.io.kept_values import read_value
+
+        loaded: Result = read_value(Path(folder), cls)
+        return replace(loaded, conversions={"dict": partial(_give_kept, Path(folder) / "result.json")})
+
     def _repr_html_(self) -> str | None:
         """The result in a notebook: its table, sections and a picture. None, so that the notebook shows the text, for a
         result that no run made."""
@@ -263,6 +330,10 @@ def _choose_mesh(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mes
     if mesh is None:
         raise ValueError(f"{owner} has no {what}: nothing is {'left' if what == 'undamaged' else 'lost'}")
     return mesh
+
+
+def _give_kept(file: Path, result: Result, what: str, site: int | None) -> Any:
+    return json.loads(file.read_text(encoding="utf-8"))
 
 
 def _require_solid(mesh: Mesh, what: str) -> Solid:

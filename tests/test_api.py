@@ -47,6 +47,7 @@ def test_a_path_is_run(by_path: Result) -> None:
     assert by_path.sites[0].centroid[2] == pytest.approx(10 - 6 * 3 / 8, abs=0.3)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("way", ["mapping of paths", "mapping of objects", "arrays"])
 def test_mapping_and_arrays_give_the_same_as_a_path(way: str, job: Path, by_path: Result) -> None:
     mesh = trimesh.creation.box(damaged_box.SIZE)
@@ -117,6 +118,7 @@ def test_bad_arrays_are_refused(part: object, scan: np.ndarray, error: type[Exce
         damageest.run(LEAST, part=part, scan=scan)
 
 
+@pytest.mark.slow
 def test_what_export_warns_of_is_in_the_result(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """In the one that is given, and in the one that is written, both with all stages."""
     export = Files.run

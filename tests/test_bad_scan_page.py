@@ -63,6 +63,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], tuple[int, 
     return call
 
 
+@pytest.mark.variants(slow=5)
 @pytest.mark.parametrize(
     "name",
     [pytest.param(name, marks=[] if name in FAST else pytest.mark.slow) for name in sorted({one for one, _ in QUOTED})],
@@ -138,6 +139,7 @@ def test_a_run_with_doubts_names_its_topics_in_one_line(run: Callable[[str], tup
     assert list_help(said) == ["help: damageest explain sparse"]
 
 
+@pytest.mark.slow
 def test_a_sparse_scan_names_two_topics_in_one_line(tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path, damaged_box.JOB.replace("tolerance: 0.2", "tolerance: 0.4"), 1000)
     done = CliRunner().invoke(app, ["run", str(job)])

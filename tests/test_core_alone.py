@@ -36,6 +36,7 @@ def without_extras(monkeypatch: pytest.MonkeyPatch, tmp_path_factory: pytest.Tem
     end_workers()
 
 
+@pytest.mark.slow
 def test_a_run_needs_no_extra_and_names_the_one_of_the_page(tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path, COARSE.replace("report: none\n", ""), 1000)
     result = damageest.run(job, output=tmp_path / "out")
@@ -57,6 +58,7 @@ def test_the_method_of_the_paper_names_its_extra(tmp_path: Path) -> None:
         damageest.run(job)
 
 
+@pytest.mark.slow
 def test_where_the_first_method_gives_no_site_the_extra_of_the_second_is_named(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -66,6 +68,7 @@ def test_where_the_first_method_gives_no_site_the_extra_of_the_second_is_named(
         damageest.run(job)
 
 
+@pytest.mark.slow
 def test_where_the_scan_contradicts_a_site_the_extra_is_told_with_it(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -77,6 +80,7 @@ def test_where_the_scan_contradicts_a_site_the_extra_is_told_with_it(
     assert [note.remedy for note in result.warnings if note.code == "fell_back"] == [describe_install("vtk")]
 
 
+@pytest.mark.slow
 def test_a_scan_in_a_format_of_an_extra_names_it(tmp_path: Path) -> None:
     job = damaged_box.write_small(tmp_path)
     (tmp_path / "scan.vtk").write_text(

@@ -93,6 +93,7 @@ def test_they_are_listed_with_their_options() -> None:
     assert "linear shrinkage of the deposit" in call("stages", "allowance", "shrinkage")
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_a_job_is_validated_with_the_first_and_runs(small_done: Path) -> None:
     text = small_done.read_text()
@@ -106,6 +107,7 @@ def test_a_job_is_validated_with_the_first_and_runs(small_done: Path) -> None:
     assert deposit.volume == pytest.approx(1.1**3 * damage.volume, rel=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_the_job_of_the_second_runs(tmp_path: Path) -> None:
     (lines,) = re.findall(r"```yaml\n(segment: .*?)```", GUIDE.read_text(), re.DOTALL)
@@ -134,6 +136,7 @@ def test_its_rule_and_its_nested_options_are_listed(tmp_path: Path) -> None:
     assert "segment.limits.outside" in refuse(job)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("installed")
 def test_its_conversion_gives_an_object_of_the_other_library(small_done: Path) -> None:
     result = damageest.run(small_done, output=True)

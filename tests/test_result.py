@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
+from damageest.artefacts import Deposit
+from damageest.result import Result
 from tests.stages.export import results
 
 
@@ -61,3 +64,18 @@ def test_what_is_not_there_is_said_with_what_is() -> None:
     for call, text in cases:
         with pytest.raises(ValueError, match=text):
             call()
+
+
+def test_lost_metal_cut_back_and_stock_are_three_numbers(small_result: Result) -> None:
+    """What `inner` takes off is part of the damage volume; what `prepare` takes off is beside it."""
+    (site,) = small_result.sites
+    assert small_result.describe_volumes() == ""
+    assert small_result.lost_volume == pytest.approx(small_result.damage_volume)
+    body = site.damage
+    deposit = Deposit(body.vertices, body.faces, cavity=body, stock_volume=7.0, cut_back_volume=0.4 * body.volume)
+    cut = replace(small_result, sites=(replace(site, deposit=deposit, accepted=True),))
+    assert cut.lost_volume == pytest.approx(small_result.damage_volume - 0.4 * body.volume)
+    assert (cut.cut_back_volume, cut.stock_volume) == (pytest.approx(0.4 * body.volume), 7.0)
+    assert re.fullmatch(r"lost metal [0-9.]+ mm³, cut-back [0-9.]+ mm³, stock 7 mm³", cut.describe_volumes())
+    opened = replace(small_result, sites=(replace(site, deposit=replace(deposit, milled=body), accepted=True),))
+    assert opened.lost_volume == pytest.approx(small_result.damage_volume)

@@ -118,6 +118,7 @@ def test_each_case_of_the_gallery_has_its_job_its_picture_and_what_was_found(reg
         assert kept[name]["total"] in GALLERY
 
 
+@pytest.mark.variants(slow=4)
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_case_of_the_gallery_gives_what_the_page_says(case: str, tmp_path: Path) -> None:
@@ -126,7 +127,9 @@ def test_a_case_of_the_gallery_gives_what_the_page_says(case: str, tmp_path: Pat
     assert len(done.sites) == len(said["sites"])
     for site, words in zip(done.sites, said["sites"], strict=True):
         assert f"**{site.verdict.level}**" in words
-        assert site.damage.volume == pytest.approx(float(words.split()[0]), rel=1e-3)
+        number = words.split()[0]
+        digit = 10.0 ** -len(number.partition(".")[2])
+        assert site.damage.volume == pytest.approx(float(number), rel=1e-3, abs=0.5 * digit)
 
 
 def test_the_readme_is_short_and_its_pictures_are_small_and_true() -> None:

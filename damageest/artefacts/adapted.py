@@ -33,7 +33,10 @@ class AdaptedPart(Checked):
 
     ``part``: the deformed part, of V vertices. ``displacement`` (V,3): that of each vertex from the part as designed;
     over intact skin it has no rigid part. ``motion`` (4,4): rigid; takes the aligned scan onto the deformed part.
-    ``modes`` (K,V,3): how exactly the displacement is known: independent errors, each as one standard deviation.
+    ``modes`` (K,V,3): how exactly the displacement is known where no intact skin shows it: independent errors, each as
+    one standard deviation; ``unfollowed``: the same beside intact skin, by what the field leaves of the worst of it.
+    ``lowered`` (V,): by how much the skin is deeper in the part than a field that hardly strains the metal has it,
+    where that is told: form or wear.
     ``other`` (V,3): what else explains the scan as well, as a change of the displacement; None where nothing does.
     ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
     uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells
@@ -69,6 +72,8 @@ class AdaptedPart(Checked):
     left: Floats | None = None
     prior: PriorUse | None = None
     designed: tuple[str, ...] = ()
+    unfollowed: float = 0.0
+    lowered: Floats | None = None
     _dtypes: ClassVar[dict[str, Any]] = {
         "displacement": np.float64,
         "motion": np.float64,
@@ -76,6 +81,7 @@ class AdaptedPart(Checked):
         "other": np.float64,
         "seen": np.float64,
         "left": np.float64,
+        "lowered": np.float64,
     }
     _ranges: ClassVar[dict[str, Range]] = {
         "amount": (0.0, MOST),
@@ -88,6 +94,7 @@ class AdaptedPart(Checked):
         "held_out": (0.0, MOST),
         "patches": (0, MOST),
         "reach": (0.0, MOST),
+        "unfollowed": (0.0, MOST),
     }
 
     def __post_init__(self) -> None:
@@ -106,5 +113,8 @@ class AdaptedPart(Checked):
         if self.left is not None:
             require_shape("left", self.left, 0 if self.seen is None else len(self.seen))
             require_finite("left", self.left)
+        if self.lowered is not None:
+            require_shape("lowered", self.lowered, count)
+            require_finite("lowered", self.lowered)
         require_shape("motion", self.motion, 4, 4)
         require_rigid("motion", self.motion)

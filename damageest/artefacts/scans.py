@@ -64,6 +64,7 @@ class Scan(Checked):
     in the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence`` (N,) on
     the scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with, the
     points of a file without are grey, and their confidence is no number. ``warnings``: what the reader doubts.
+    ``columns``: which columns of text files are x, y and z, and why, where it is not plain.
     """
 
     points: Floats
@@ -81,6 +82,7 @@ class Scan(Checked):
     confidence: Singles | None = None
     warnings: tuple[Reason, ...] = ()
     cloud: NDArray[np.int32] | None = None
+    columns: tuple[str, ...] = ()
     _dtypes: ClassVar[dict[str, Any]] = {
         "points": np.float64,
         "normals": np.float64,

@@ -72,11 +72,11 @@ def read_rows(folder: Path) -> dict[str, Row]:
     """The rows of the batch that was last written to this folder, by name, also where it was killed; none where there
     was none."""
     values: list[Any] = []
-    with contextlib.suppress(OSError, ValueError, KeyError, TypeError):
+    with contextlib.suppress(OSError, ValueError, KeyError, TypeError, RecursionError):
         values += read_json(folder / "batch.json")["jobs"]
     with contextlib.suppress(OSError, ValueError):
         for line in (folder / NEW_ROWS).read_text(encoding="utf-8").splitlines():
-            with contextlib.suppress(ValueError):  # the last line, where the batch was killed in it
+            with contextlib.suppress(ValueError, RecursionError):  # the last line, where the batch was killed in it
                 values.append(json.loads(line))
     rows = {}
     for one in values:

@@ -47,7 +47,7 @@ SOURCES: dict[str, Source] = {
     "fitted_scale": Source("scale of the scan, fitted to the part", "A"),
 }
 """The sources of a budget, in the order of its rows."""
-OWN = ("noise", "spacing", "rim", "probing_form")
+OWN = ("noise", "probing_form")
 """Sources that are different in each site."""
 UNKNOWN = {
     "probing_form": "probing form error",
@@ -99,10 +99,9 @@ def make_volume_budget(
         return np.asarray(np.sum(found, axis=0)) if found else np.empty(0)
 
     own = {name: np.array([getattr(one, name) for one in measured]) for name in OWN}
-    sizes = {name: float(np.linalg.norm(values)) / area for name, values in own.items()}
     parts = [
         _Parts("noise", own["noise"], noise, unit),
-        *(_Parts(name, own[name], sizes[name], unit) for name in ("spacing", "rim")),
+        *(share(name) for name in ("spacing", "rim")),
         *(_Parts(name, gather(name), float(np.linalg.norm(gather(name))) / area, unit) for name in ("pose", "adapt")),
         *(share(name) for name in ("form", "outward", "views")),
         _Parts("tessellation", share("tessellation").columns, tessellation / 3**0.5, unit),
@@ -114,6 +113,7 @@ def make_volume_budget(
         BudgetBound("closed", "inner surface closed across what was not seen", -sum(x.less for x in errors), 0.0),
         BudgetBound("inside", "no points show the inner surface", 0.0, sum(x.inside for x in errors)),
         BudgetBound("beside", "skin beside it is not seen", 0.0, sum(x.beside for x in errors)),
+        BudgetBound("form", "the field that adapts the part makes it thinner", 0.0, sum(x.taken for x in errors)),
         BudgetBound("fading", "it fades out beyond its rim", 0.0, sum(x.fading for x in errors)),
         BudgetBound("doubtful", "sites that are not accepted, and places that may be damage", 0.0, doubtful),
     ]

@@ -6,11 +6,12 @@ form of the part, or of the scanner. It limits the pose as well, since a patch t
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from damageest.artefacts import INTACT, OUTLIER, Deviation, Flags, Floats, Part, Scan
+from damageest.artefacts import INTACT, OUTLIER, Deviation, Flags, Floats, FreeMotion, Part, Scan
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_faced_cubes
 
@@ -28,6 +29,8 @@ ALIKE = 0.1
 """Correlation from which on patches count as independent."""
 MOST_PATCHES = 1500
 """Patches that are compared in pairs."""
+MOST_TRIANGLES = 400
+"""Places of a footprint that are compared in pairs."""
 SIGNIFICANT = 22.5
 """Square of a deviation of the pose, in its standard deviations, from which it is real: one in a thousand by chance, of
 six degrees of freedom."""
@@ -40,9 +43,9 @@ class PoseError:
     ``spread`` (6,K): columns of independent errors, one standard deviation each, of a small motion of the scan in the
     part's frame: rotation about ``centre`` (3,) in radians, then shift. ``systematic``: standard deviation of the mean
     distances of patches of intact skin that noise does not explain; ``patch_area``: area over which it is common, from
-    the correlation of patches with their distance (as of a semivariogram). ``by_offset``, ``by_scale`` (6,): the motion
-    that the fit finds for each unit by which all of the scan lies outside, and for each share by which it is scaled
-    about ``centre``; 0 for a pose that was given.
+    the correlation of patches with their distance (as of a semivariogram): ``alike`` (L,) at distances of 1, 2, ...
+    ``edge``, 0 beyond the last. ``by_offset``, ``by_scale`` (6,): the motion that the fit finds for each unit by which
+    all of the scan lies outside, and for each share by which it is scaled about ``centre``; 0 for one that was given.
     """
 
     centre: Floats
@@ -51,6 +54,35 @@ class PoseError:
     patch_area: float
     by_offset: Floats = field(default_factory=lambda: np.zeros(6))
     by_scale: Floats = field(default_factory=lambda: np.zeros(6))
+    alike: Floats = field(default_factory=lambda: np.empty(0))
+    edge: float = 0.0
+
+    def leave_out(self, motions: Sequence[FreeMotion], radius: float) -> PoseError:
+        """The error without what lies along free ``motions``: these are swept, and the same cause is not counted twice.
+        ``radius``: distance at which a turn counts like a shift."""
+        if not motions:
+            return self
+        scale = np.array([radius] * 3 + [1.0] * 3)
+        turns = [np.asarray(one.direction) * one.turn if one.point is not None else np.zeros(3) for one in motions]
+        shifts = [one.move(self.centre[None])[0] for one in motions]
+        ways = scale[:, None] * np.concatenate([np.array(turns), np.array(shifts)], axis=1).T
+        along = np.linalg.qr(ways)[0]
+        spread = scale[:, None] * self.spread
+        return replace(self, spread=(spread - along @ (along.T @ spread)) / scale[:, None])
+
+    def measure_common(self, places: Floats, areas: Floats) -> float:
+        """Share of the systematic error that is common to a footprint, as a standard deviation: the root of the mean of
+        its correlation over all pairs of places (F,3), each with its area (F,) (JCGM 100, 5.2.2). 1 for a site that is
+        small against the distance over which errors are alike, and where that is not known."""
+        total = float(areas.sum())
+        if self.edge <= 0 or len(places) < 2 or total <= 0:
+            return 1.0
+        from scipy.spatial.distance import pdist
+
+        rng = np.random.default_rng(0)
+        some = places[rng.choice(len(places), MOST_TRIANGLES, p=areas / total)]
+        lags = self.edge * np.arange(len(self.alike) + 2)
+        return float(np.sqrt(np.interp(pdist(some), lags, [1.0, *self.alike, 0.0]).mean()))
 
     def of_volume(self, damage_skin: Floats, normals: Floats, areas: Floats) -> Floats:
         """The errors (K,) of a volume, one for each column of ``spread``.
@@ -62,21 +94,21 @@ class PoseError:
         A small motion v of the inner surface changes the volume by the integral of v.n over it. The flux of a rigid
         motion through a closed surface is 0, so this is minus the integral over the skin, which is exact on triangles.
         """
-        rows = _make_rows(damage_skin - self.centre, normals)
+        rows = make_rows(damage_skin - self.centre, normals)
         return np.asarray(-(areas @ rows) @ self.spread)
 
     def of_motion(self, motion: Floats, damage_skin: Floats, normals: Floats, areas: Floats) -> float:
         """Change of a volume by a small ``motion`` (6,) of the scan; the others as in `of_volume`."""
-        return -float(areas @ _make_rows(damage_skin - self.centre, normals) @ motion)
+        return -float(areas @ make_rows(damage_skin - self.centre, normals) @ motion)
 
     def move_distance(self, motion: Floats, place: Floats, normal: Floats) -> float:
         """Change of the signed distance of a place (3,) to the skin with the outward ``normal`` (3,) by a small
         ``motion`` (6,) of the scan."""
-        return float(_make_rows(place[None] - self.centre, normal[None])[0] @ motion)
+        return float(make_rows(place[None] - self.centre, normal[None])[0] @ motion)
 
     def of_distance(self, place: Floats, normal: Floats) -> float:
         """Standard deviation of the signed distance of a place (3,) to the skin with the outward ``normal`` (3,)."""
-        row = _make_rows(place[None] - self.centre, normal[None])[0]
+        row = make_rows(place[None] - self.centre, normal[None])[0]
         return float(np.linalg.norm(row @ self.spread))
 
 
@@ -122,7 +154,8 @@ def measure_pose_error(
         systematic = _measure_excess(left, variance)
         limit = 3 * np.sqrt(variance + systematic**2)
         weights = np.minimum(1, limit / np.maximum(np.abs(left), 1e-300))
-    area = _measure_area_alike(left, places, systematic, edge)
+    alike = _correlate(left, places, systematic, edge)
+    area = edge**2 * (1 + float(2 * np.pi * np.arange(1, len(alike) + 1) @ alike))
     systematic = max(systematic, form)
     if held:
         answers: Floats = np.zeros((2, 6))
@@ -140,7 +173,7 @@ def measure_pose_error(
         errors = np.column_stack([errors, scale @ motion])
     if spread is not None:
         errors = np.column_stack([errors, spread])
-    return PoseError(centre, errors, systematic, area, *answers)
+    return PoseError(centre, errors, systematic, area, answers[0], answers[1], alike, edge)
 
 
 def _find_answers(rows: Floats, height: Floats, trust: Floats, prior: Floats) -> Floats:
@@ -151,7 +184,7 @@ def _find_answers(rows: Floats, height: Floats, trust: Floats, prior: Floats) ->
     return np.asarray(np.linalg.solve(weighted @ rows + prior, weighted @ asked).T)
 
 
-def _make_rows(places: Floats, normals: Floats) -> Floats:
+def make_rows(places: Floats, normals: Floats) -> Floats:
     """(N,6) change of the signed distance of places (N,3) with a rotation about the origin, and with a shift."""
     return np.concatenate([np.cross(places, normals), normals], axis=1)
 
@@ -159,7 +192,7 @@ def _make_rows(places: Floats, normals: Floats) -> Floats:
 def _average_patches(
     part: Part, aligned: Scan, deviation: Deviation, centre: Floats, edge: float
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Mean distance (P,) of patches of intact skin, their places (P,3), mean rows (P,6) of `_make_rows`, mean height
+    """Mean distance (P,) of patches of intact skin, their places (P,3), mean rows (P,6) of `make_rows`, mean height
     (P,) along the normal over the centre, and number of points (P,)."""
     index = np.flatnonzero(deviation.label == INTACT)
     step = max(1, -(-len(index) // MOST_POINTS))
@@ -170,7 +203,7 @@ def _average_patches(
     places = aligned.points[index] - centre
     _, number = number_faced_cubes(places, normals, edge)
     _, group, count = group_integers(number)
-    rows = _make_rows(places, normals)
+    rows = make_rows(places, normals)
     mean = np.bincount(group, weights=deviation.distance[index]) / count
     height = np.bincount(group, weights=np.einsum("ij,ij->i", places, normals)) / count
     mean_places, mean_rows = (
@@ -193,11 +226,11 @@ def _measure_excess(left: Floats, variance: Floats) -> float:
     return float(np.sqrt(max(ratio - chance, 0.0) * np.median(variance)))
 
 
-def _measure_area_alike(left: Floats, places: Floats, systematic: float, edge: float) -> float:
-    """The area over which patches at ``places`` (P,3) deviate alike: the integral over the plane of the correlation of
-    what is ``left`` (P,), at least one patch."""
+def _correlate(left: Floats, places: Floats, systematic: float, edge: float) -> Floats:
+    """The correlation (L,) of what is ``left`` (P,) of patches at ``places`` (P,3), at distances of 1, 2, ... edges, up
+    to the first at which they are independent."""
     if not systematic:
-        return edge**2
+        return np.empty(0)
     from scipy.spatial.distance import pdist
 
     some = np.random.default_rng(0).permutation(len(left))[:MOST_PATCHES]
@@ -209,5 +242,4 @@ def _measure_area_alike(left: Floats, places: Floats, systematic: float, edge: f
     product = np.bincount(lag[near], weights=(value[first] * value[second])[near], minlength=LAGS + 1)
     alike = product[1:] / np.maximum(count[1:], 1) / systematic**2
     independent = np.flatnonzero(alike < ALIKE)
-    alike = np.clip(alike[: independent[0]] if len(independent) else alike, 0, 1)
-    return edge**2 * (1 + float(2 * np.pi * np.arange(1, len(alike) + 1) @ alike))
+    return np.asarray(np.clip(alike[: independent[0]] if len(independent) else alike, 0, 1))

@@ -46,7 +46,7 @@ def gather_scan_facts(
         systematic=_measure_systematic(skin, aligned.noise),
         outward_area=area,
         outward_height=height,
-        between_views=compare_views(aligned, deviation, skin.cells.edge, tolerance),
+        between_views=compare_views(part, aligned, deviation, skin.cells.edge, tolerance),
         sheets_share=sheets.share,
         sheets_apart=sheets.apart,
         pose=pose.doubts,

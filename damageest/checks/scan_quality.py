@@ -284,10 +284,8 @@ def require_walls(tolerance: float, part: Part) -> None:
 
 def _measure_walls(part: Part) -> Floats:
     """The thickness of the part below points on its skin, as far as rays meet it again."""
-    from damageest.geometry.rays import prepare_rays
+    from damageest.geometry.rays import measure_thickness
 
     points, face = sample_by_area(part, 2000, np.random.default_rng(0))
-    normals = part.face_normals[face]
-    start = points - 1e-5 * part.diagonal * normals
-    thickness = prepare_rays(part).find_first(start, -normals)[0]
+    thickness = measure_thickness(part, points, part.face_normals[face])
     return np.asarray(thickness[np.isfinite(thickness)])

@@ -7,8 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan, Solid
+from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
+from damageest.geometry.skin import extract_ids
 
 NEIGHBOURS = 12
 """Points looked at about each point."""
@@ -27,6 +29,8 @@ AMONG = 1.3
 other. In a groove that is narrower than the neighbourhood, the upper ones lie on both sides and farther."""
 FARTHEST = 6.0
 """Distance of both in tolerances, from which they are no misplaced view: that is found by what lies outside."""
+WALL = 2.5
+"""Thinnest wall that may be left, in tolerances: thinner, it is a layer between two views."""
 ON_SKIN = 0.5
 """Largest depth, in tolerances, of the upper surface over a site."""
 FACING = 3.0
@@ -62,11 +66,19 @@ class SheetPlaces(NamedTuple):
     below: Floats
 
 
-def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members: Ints, tolerance: float) -> float:
+def measure_two_sheets(
+    aligned: Scan,
+    deviation: Deviation,
+    part: Part,
+    members: Ints,
+    tolerance: float,
+    damage: Solid | None = None,
+) -> float:
     """Share of a site's points ``members`` (M,) where the scan shows another surface above them, on the skin.
 
     At the rim of a loss points of both kinds lie side by side. Where two views do not fit together, or one surface was
-    scanned twice with an error between, they lie in the same place.
+    scanned twice with an error between, they lie in the same place. A thin wall that is left, as of a tooth cut along
+    its flank, has two sides; by the ``damage`` volume, the lower one faces away from the skin above it.
     """
     if len(members) < NEIGHBOURS:
         return 0.0
@@ -75,9 +87,21 @@ def measure_two_sheets(aligned: Scan, deviation: Deviation, part: Part, members:
     near = find_in_box(aligned.points, low, high)
     step = max(1, len(members) // MOST_ASKED)
     asked = members[::step]
-    is_double, upper, _ = _find_double(aligned, deviation, part, asked, near, tolerance)
+    is_double, upper, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
     is_double &= upper < ON_SKIN * tolerance
+    if damage is not None:
+        walls = is_double & (apart > WALL * tolerance)
+        is_double[walls] = _faces_skin(aligned, deviation, part, asked[walls], damage)
     return float(is_double.mean()) if step * is_double.sum() >= FEWEST_POINTS else 0.0
+
+
+def _faces_skin(aligned: Scan, deviation: Deviation, part: Part, index: Ints, damage: Solid) -> Flags:
+    """Whether the inner surface at each of the points (K,) faces the nearest skin, across the metal that is lost."""
+    floor = extract_ids(damage, part)
+    if not len(floor.faces) or not len(index):
+        return np.ones(len(index), bool)
+    _, face, _ = closest_on_mesh(aligned.points[index], floor)
+    return np.asarray(np.einsum("ij,ij->i", floor.face_normals[face], part.face_normals[deviation.face[index]]) > 0)
 
 
 def measure_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> Sheets:

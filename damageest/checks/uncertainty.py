@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
+from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Mesh, Part, Scan, Solid
 from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface, pair_faces
 from damageest.checks.pose_error import PoseError
@@ -16,7 +16,9 @@ from damageest.checks.site_error import WIDTH, SiteError
 from damageest.findings import Coverage
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.lost_depth import LostDepth
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
+from damageest.geometry.sampling import sample_by_area
 from damageest.rules import ScanFacts
 from damageest.rules.inner_surface import GAP
 
@@ -31,7 +33,7 @@ OUTWARD = 0.3
 """Share of a site's area that skin which lies outside by some tolerances has to have, to be the sign of one error: no
 damage puts skin outside."""
 ASKED = 2000
-"""Scan points among which the deepest ones of a site are looked for."""
+"""Of the deepest scan points of a site, those beside which its volume is looked at."""
 
 AROUND, NOISY, SLOPE = 25, 3.0, 0.7
 """Scan points about the deepest one, it among them, that tell whether it lies in a corner of the inner surface; by how
@@ -39,12 +41,18 @@ many standard deviations of their noise the deepest of many points is deeper tha
 of what it is deeper by, by which a corner goes beyond it: these points are two gaps away, the deepest about one."""
 POINT_GAP = 1.1
 """Spacing of points in square roots of the area that each stands for, as `measure_noise_and_spacing` gives it."""
+BESIDE = 10.0
+"""Distance from a damage volume, in tolerances, up to which what a field made thinner may be the same wear."""
+PLACES = 500
+"""Places on the skin at which the depth of a site is measured."""
+QUANTILES = np.linspace(0.01, 0.99, 50)
+"""Those of the depth that are kept of a site."""
 MOST = 50_000
 """Scan points whose largest depth is taken."""
 
 
 class _Place(NamedTuple):
-    """``depth`` below the skin of a place ``at`` (3,), and the outward ``normal`` (3,) of the skin nearest to it;
+    """``depth`` of a place ``at`` (3,) below the lost skin, and the outward ``normal`` (3,) of that;
     ``measured``: the largest depth of a scan point; ``rise``: by how much those nearest to it are less deep."""
 
     depth: float
@@ -82,7 +90,10 @@ def measure_site_error(
     # what deviates moves the inner surface against the skin: of a wall that broke off, the root alone
     exposed = min(skin_area, float(area[inner].sum()))
     patches = max(1.0, exposed / max(pose.patch_area, 1e-300))
-    systematic = max(pose.systematic, scan.systematic)
+    # what an adapted part leaves of intact skin is what its field is off by there: the same cause, one term
+    unfollowed = adapted.unfollowed if adapted else 0.0
+    systematic = max(pose.systematic, scan.systematic, unfollowed)
+    common = pose.measure_common(damage.triangles[skin].mean(axis=1), area[skin])
     outward = _limit_outward(scan, skin_area)
     curved = _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
@@ -119,8 +130,8 @@ def measure_site_error(
         excess=surface.excess,
         pose=pose.of_volume(damage.triangles[skin].mean(axis=1), damage.face_normals[skin], area[skin]),
         tessellation=part.tessellation_error * curved / np.sqrt(3),
-        # a form that a fit gives is common to the whole site; that of patches is different in each
-        form=float(max(form, systematic / np.sqrt(patches), AVERAGED * tolerance) * exposed),
+        # a form that a fit gives is common to the whole site; that of patches as far as they deviate alike
+        form=float(max(form, systematic * common, AVERAGED * tolerance) * exposed),
         outward=outward * exposed / WIDTH,
         views=scan.between_views * exposed / WIDTH,
         adapt=bent[:-1] if has_other else bent,
@@ -128,6 +139,7 @@ def measure_site_error(
         motions=np.tile([0.0, 1.0], (len(rates), 1)),
         inside=HOLE * hole**1.5 + beyond.short,
         less=damage.volume * evidence.ids_unseen if hole else 0.0,
+        taken=measure_lowered(adapted, damage, BESIDE * tolerance),
         depth=deepest.depth - surface.depth_excess,
         depth_error=float(np.sqrt(surface.depth**2 + beside)),
         corner=corner,
@@ -141,6 +153,7 @@ def measure_site_error(
         depth_scanner=shares.depth,
         depth_by=depth_by,
         exposed=exposed,
+        depths=_measure_depths(damage, inner),
         curved=curved,
     )
 
@@ -167,6 +180,29 @@ def measure_shifts(part: Part, fields: Floats, places: Floats, normals: Floats) 
     return np.asarray(np.einsum("nc,jnck,nk->jn", corners, fields[:, part.faces[face]], normals))
 
 
+def _measure_depths(damage: Solid, inner: Flags) -> Floats:
+    """Quantiles of how deep a loss is below places all over the skin that it removes."""
+    places, _ = sample_by_area(damage, PLACES, np.random.default_rng(0), np.flatnonzero(~inner))
+    return np.asarray(np.quantile(distance_to_mesh(places, Mesh(damage.vertices, damage.faces[inner])), QUANTILES))
+
+
+def measure_lowered(adapted: AdaptedPart | None, damage: Solid, reach: float) -> float:
+    """Volume that the field of an adapted part took off beneath a damage volume and within ``reach`` of it, where a
+    field that hardly strains the metal leaves it: wear would look the same."""
+    if adapted is None or adapted.lowered is None or not adapted.lowered.any():
+        return 0.0
+    part = adapted.part
+    depth = adapted.lowered[part.faces].mean(axis=1)
+    some = np.flatnonzero(depth > 0)
+    centres = part.triangles[some].mean(axis=1)
+    near = ((centres > damage.bounds[0] - reach) & (centres < damage.bounds[1] + reach)).all(axis=1)
+    some, centres = some[near], centres[near]
+    if not len(some):
+        return 0.0
+    own = some[distance_to_mesh(centres, damage) < reach]
+    return float(depth[own] @ np.linalg.norm(part.cross[own], axis=1)) / 2
+
+
 def _limit_outward(scan: ScanFacts, skin_area: float) -> float:
     """Height up to which the loss may come from the same error as skin that lies outside; 0 where there is too little
     of it."""
@@ -189,21 +225,21 @@ def limit_beside(coverage: Coverage, damage: Solid, reach: float, depth: float) 
 def _find_deepest(damage: Solid, inner: Flags, part: Part, members: Floats, reach: float) -> _Place:
     """The deepest place of a damage volume. It is near the deepest scan points, so that the other vertices are not
     asked; ``reach``: how near."""
+    lost = LostDepth.build(damage, part, inner)
     vertices = damage.vertices[np.unique(damage.faces[inner])]
-    step = max(1, len(members) // ASKED)
-    depth = distance_to_mesh(members[::step], part)
-    deep = members[::step][depth > depth.max() - reach]
-    near = vertices[find_nearby(vertices, deep, reach)]
-    distance, face, _ = closest_on_mesh(near if len(near) else vertices, part)
-    at = int(distance.argmax())
     # the maximum of a part of many points would be less than what was measured
     asked = members[:: max(1, len(members) // MOST)]
-    depths = distance_to_mesh(asked, part)
-    first = int(depths.argmax())
+    depths, _ = lost.measure(asked)
+    deep = asked[depths > depths.max() - reach]
+    near = vertices[find_nearby(vertices, deep[:: max(1, len(deep) // ASKED)], reach)]
+    near = near if len(near) else vertices
+    depth, normals = lost.measure(near)
+    at, first = int(depth.argmax()), int(depths.argmax())
     _, beside = find_neighbours(asked[first : first + 1], min(AROUND, max(7, len(asked) // 4)), asked)
     rise = float(depths[first] - np.median(depths[beside]))
-    place = (near if len(near) else vertices)[at]
-    return _Place(float(distance[at]), float(depths[first]), rise, place, part.face_normals[face[at]])
+    if lost.through > depth[at]:
+        return _Place(lost.through, max(lost.through, float(depths[first])), rise, lost.middle, normals[at])
+    return _Place(float(depth[at]), float(depths[first]), rise, near[at], normals[at])
 
 
 def _measure_curved(damage: Solid, skin: Flags, area: Floats) -> float:

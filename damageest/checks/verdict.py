@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterable, Sequence
 
 from damageest.artefacts import Reason
+from damageest.errors import clean_message, is_interrupt
 from damageest.findings import Interval, Level, Verdict
-from damageest.rules import Rule, ScanFacts, SiteFacts
-from damageest.rules.nothing import NOTHING
+from damageest.isolation import at_work
+from damageest.rules import RULE_FAILED, Rule, ScanFacts, SiteFacts
+from damageest.rules.nothing import is_nothing
 
 NARROW = 0.05
 """Half-width of the interval, as a share of the volume, up to which a site is proven."""
@@ -16,9 +18,41 @@ ORDER = {"contradicts": 0, "open": 1, "widens": 2, "note": 3}
 
 
 def ask_rules(rules: Iterable[Rule], site: SiteFacts, scan: ScanFacts) -> tuple[Reason, ...]:
-    """The reasons of all rules, those first that change the verdict most."""
-    found = [reason for rule in rules for reason in rule.ask(site, scan)]
+    """The reasons of all rules, those first that change the verdict most. A rule of a plugin that fails makes the site
+    doubtful: what it was to find is not known."""
+    found = [
+        reason for rule in rules for reason in (ask_stranger(rule, site, scan) if rule.owner else rule.ask(site, scan))
+    ]
     return tuple(sorted(dict.fromkeys(found), key=lambda reason: ORDER[reason.effect]))
+
+
+def ask_stranger(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
+    """The reasons of a rule of a plugin; where it fails, or gives what is none of its own, one that says so."""
+    try:
+        with at_work(f"rule {rule.code}", owner=rule.owner):
+            given = rule.ask(site, scan)
+            found = list(given)
+    except BaseException as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        return [_tell_failed(rule, f"failed: {type(error).__name__}: {clean_message(error, 400)}")]
+    for reason in found:
+        if not isinstance(reason, Reason):
+            return [_tell_failed(rule, f"gave a {type(reason).__name__}, and has to give Reasons")]
+        if reason.code != rule.code:
+            return [_tell_failed(rule, f"gave a reason with the code '{clean_message(reason.code, 80)}', not its own")]
+        if reason.effect not in ORDER:
+            return [_tell_failed(rule, f"gave a reason with an effect that is none of {', '.join(ORDER)}")]
+    return found
+
+
+def _tell_failed(rule: Rule, why: str) -> Reason:
+    return Reason(
+        RULE_FAILED,
+        f"a check could not be made: the rule {type(rule).__qualname__} ('{rule.code}') of {rule.owner} {why}",
+        "contradicts",
+        remedy=f"report it to the authors of {rule.owner}, or uninstall it",
+    )
 
 
 def open_end(interval: Interval | None, reasons: Sequence[Reason]) -> Interval | None:
@@ -27,16 +61,16 @@ def open_end(interval: Interval | None, reasons: Sequence[Reason]) -> Interval |
     return (interval[0], math.inf) if interval and is_open else interval
 
 
-def decide(volume: float, interval: Interval | None, reasons: tuple[Reason, ...]) -> Verdict:
-    """The verdict on a damage volume.
+def decide(volume: float, interval: Interval | None, reasons: tuple[Reason, ...], certain: float = 0.0) -> Verdict:
+    """The verdict on a damage volume, of which a piece of ``certain`` volume is lost in any case.
 
     A cause that has a size is a term of the ``interval`` and condemns nothing by itself; a contradiction does.
     """
-    return Verdict(_choose_level(volume, interval, {reason.effect for reason in reasons}), reasons)
+    return Verdict(_choose_level(volume, interval, {reason.effect for reason in reasons}, certain), reasons)
 
 
-def _choose_level(volume: float, interval: Interval | None, effects: set[str]) -> Level:
-    if "contradicts" in effects or interval is None or interval[0] <= NOTHING * volume:
+def _choose_level(volume: float, interval: Interval | None, effects: set[str], certain: float) -> Level:
+    if "contradicts" in effects or interval is None or is_nothing(volume, interval, certain):
         return "doubtful"
     is_narrow = (interval[1] - interval[0]) / 2 <= NARROW * volume
     return "proven" if is_narrow and "open" not in effects else "likely"

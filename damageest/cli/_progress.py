@@ -30,6 +30,8 @@ LONG = 1.0
 """Seconds from which on a stage has a bar."""
 SHOWN = 0.05
 """Seconds from which on what is no stage has a line of its own."""
+APART = 5.0
+"""Seconds between the lines, in a pipe, for parts of a stage's work."""
 IDLE = {("allowance", "none"), ("path", "none"), ("report", "none")}
 """Stages with implementations that do nothing. They are not listed; result.json has them."""
 
@@ -70,6 +72,7 @@ class Progress:
         self.finished: list[str] = []
         self.current = ""
         self.is_idle = False
+        self.told = 0.0
         self._begin_group("", "")
 
     @contextmanager
@@ -124,6 +127,7 @@ class Progress:
         if self.is_idle:
             return
         label = self.current = _format_label(stage, use, site)
+        self.told = time.perf_counter()
         if self.live is None:
             if not self.console.quiet:
                 sys.stderr.write(f"  {label:<40} ")
@@ -134,6 +138,17 @@ class Progress:
             self._begin_group(stage, use)
         of = f" of {self.sites}" if site and self.sites >= site else ""
         self._show(label + of, 0.0 if site else SECONDS.get(stage, 0.0) * self.points / 1e5)
+
+    @hookimpl
+    def damageest_part_begins(self, what: str) -> None:
+        """On a terminal the live line says what is at work; in a pipe a new part is listed after `APART` seconds."""
+        if self.live is not None:
+            for task in self.live.tasks:
+                self.live.update(task.id, description=f"{self.current} ({clean_message(what)})")
+        elif time.perf_counter() - self.told >= APART and not self.console.quiet:
+            self.told = time.perf_counter()
+            sys.stderr.write(f"\n    {clean_message(what):<38} ")
+            sys.stderr.flush()
 
     @hookimpl
     def damageest_after_stage(self, stage: str, site: int, output: object, seconds: float, cached: bool) -> None:

@@ -18,6 +18,8 @@ Show = Callable[[str], None]
 """Prints one line."""
 MOST_UNSEEN = 5
 """Unseen regions that are printed; result.json has all."""
+STRAYS = 0.005
+"""Share of the scan's points at either end that its size does without."""
 MOST_SURPLUS = 3
 """Surpluses of a kind that are printed each by itself, largest first; result.json has all."""
 UNSEEN_WHY = {
@@ -27,6 +29,9 @@ UNSEEN_WHY = {
     "earlier scan": "not in the earlier scan either",
 }
 
+NOTHING_TOLD = 4
+"""Terms that are in no interval where the job tells neither certificate nor temperature: then it knows that."""
+
 
 def print_table(result: Result, target: Path) -> None:
     """Prints the sites with the result of the check against the scan, notes, and the path of the output folder."""
@@ -35,6 +40,7 @@ def print_table(result: Result, target: Path) -> None:
     from rich.text import Text
 
     from damageest.findings import describe_interval, describe_volume
+    from damageest.geometry.units import describe_size
     from damageest.rules.advice import list_topics
     from damageest.rules.notes import cap_notes, list_notes, qualify_nothing
 
@@ -44,6 +50,8 @@ def print_table(result: Result, target: Path) -> None:
         console.print(Text(label, style) + Text(clean_message(text)))  # no text is markup
 
     unit = result.units
+    for text in result.scan.columns if result.scan else ():
+        show(text)
     if result.sites:
         table = Table(title=None, box=None, pad_edge=False, header_style="bold")
         heads = ["site", f"volume {unit}³", f"area {unit}²", f"depth {unit}"]
@@ -65,7 +73,9 @@ def print_table(result: Result, target: Path) -> None:
         # what an earlier scan shows bounds no volume of its own
         whole = "" if result.part.unseen is not None else f"; part volume: {result.part.volume:.6g} {unit}³"
         show(f"damage volume: {describe_volume(result.damage_volume, result.volume_95)} {unit}³{known}{whole}")
-        if result.not_in_budget:
+        if volumes := result.describe_volumes():
+            show(f"of it and beside it: {volumes}")
+        if 0 < len(result.not_in_budget) < NOTHING_TOLD:
             show(f"not known, and in no interval: {', '.join(result.not_in_budget)}")
     elif not result.failures:
         where = f"{_on_seen(result)}{qualify_nothing(result.warnings)}"
@@ -73,6 +83,8 @@ def print_table(result: Result, target: Path) -> None:
         if result.pose.free and result.volume_95 and result.volume_95[1] > 0:
             most = f"{result.volume_95[1]:.4g} {unit}³"
             show(f"the pose is free: wear of up to {most} over a whole face would not show; see align.datum")
+    scan = describe_size(result.aligned.points, unit, STRAYS)
+    show(f"part {describe_size(result.part.vertices, unit)}, scan {scan} along the part's axes")
     _print_coverage(result, show)
     if result.sensor is not None:
         show(_describe_sensor(result.sensor, unit))

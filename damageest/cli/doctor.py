@@ -7,12 +7,15 @@ import os
 import platform
 import time
 from dataclasses import asdict, dataclass
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._streams import keep_for_results, say
+
+if TYPE_CHECKING:
+    from damageest.registry import Registry
 
 LIBRARIES = ("GL", "EGL", "X11", "OpenGL")
 """Shared libraries that pictures, windows and some plugins load."""
@@ -89,8 +92,41 @@ def examine(quick: bool) -> Findings:
         libraries={name: find_library(name) or "" for name in LIBRARIES},
         plugins=[f"{one}" for one in registry.providers],
         self_test=told,
-        faults=[*faults, *([fault] if fault else [])],
+        faults=[*faults, *([fault] if fault else []), *try_plugins(registry)],
     )
+
+
+def try_plugins(registry: Registry) -> list[str]:
+    """What goes wrong with each rule and each writer of a plugin on a small example: facts of one site, and a box."""
+    from pathlib import Path
+    from tempfile import TemporaryDirectory
+
+    from manifold3d import Manifold
+
+    from damageest.artefacts import Evidence, Solid
+    from damageest.checks.verdict import ask_stranger
+    from damageest.errors import StageError
+    from damageest.geometry.solids import to_arrays
+    from damageest.registry.loading import OWN
+    from damageest.rules import RULE_FAILED, ScanFacts, SiteFacts
+    from damageest.stages.export import Body
+
+    site = SiteFacts(100.0, 40.0, 120.0, 200, 1.0, 2.0, Evidence(), (95.0, 105.0))
+    scan = ScanFacts(0.2, 0.3, "mm", noise=0.03, seen_area=2000.0)
+    faults = []
+    for rule in registry.rules:
+        reasons = ask_stranger(rule, site, scan) if rule.owner else []
+        faults += [f"{one.text}; try: {one.remedy}" for one in reasons if one.code == RULE_FAILED]
+    box = Body("box", Solid(*to_arrays(Manifold.cube((4, 3, 2)))), (200, 60, 50))
+    for name, writer in registry.writers.items():
+        if registry.formats[name].name == OWN or writer.document:
+            continue
+        with TemporaryDirectory(prefix="damageest-") as folder:
+            try:
+                writer.write(Path(folder), "box", [box], "mm")
+            except (StageError, OSError) as error:
+                faults.append(f"export: {error}")
+    return faults
 
 
 def _list_packages() -> dict[str, str]:

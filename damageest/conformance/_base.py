@@ -16,6 +16,7 @@ import pytest
 from damageest.artefacts import ArtefactError, Floats
 from damageest.conformance import _scene
 from damageest.errors import InputError, StageError
+from damageest.isolation import call_isolated
 from damageest.registry.contracts import contract_of
 from damageest.registry.outputs import check_output
 from damageest.stages import Stage
@@ -143,6 +144,16 @@ class StageContract:
     def test_same_bytes_twice(self) -> None:
         changed = name_changes(to_named_bytes(self.get_result()), to_named_bytes(self.run_again()))
         assert not changed, "the second run gave other bytes here"
+
+    def test_runs_in_a_process_of_its_own(self) -> None:
+        """As the engine runs it, where its class says ``isolated``: code, options, inputs and result are pickled."""
+        if not type(self.stage).isolated:
+            pytest.skip("it runs in the engine's process")
+        given = self.make_inputs()
+        named = {name: given[name] for name in self.stage.needs()}
+        result = call_isolated(self.stage.run, named, worker="conformance", stays=False)
+        changed = name_changes(to_named_bytes(self.get_result()), to_named_bytes(result))
+        assert not changed, "in a process of its own it gave other bytes here"
 
     def test_leaves_its_inputs(self) -> None:
         changed = self._run_and_watch()[1]

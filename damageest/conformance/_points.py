@@ -11,6 +11,7 @@ import pytest
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Deviation, Floats, Pose, Scan, Sites
 from damageest.conformance import _scene
 from damageest.conformance._base import FAR, TURN, PlacementContract, check_or_refused
+from damageest.errors import StageError
 
 
 def make_pose(turn: Floats, shift: Floats) -> Floats:
@@ -61,6 +62,19 @@ class AlignContract(PlacementContract):
         deviation, pose = _scene.make_scene().deviation, self.get_result()
         assert pose.inliers == pytest.approx((deviation.label == INTACT).mean(), abs=0.05)
         assert 0 < pose.rms < _scene.TOLERANCE
+
+    def test_says_whether_the_pose_is_fitted(self) -> None:
+        """A pose that stays where the scan lies elsewhere by a fifth of the tolerance is a known one."""
+        scan: Scan = self.make_scene()["scan"]
+        shift = np.array([0.1, 0.13, 0.11]) * _scene.TOLERANCE
+        try:
+            moved = self.run(scan=replace(scan, points=scan.points + shift))
+        except StageError:
+            pytest.skip("it refuses a scan that lies elsewhere")
+        stays = np.allclose(moved.T_part_scan, self.get_result().T_part_scan, rtol=0, atol=1e-9)
+        fitted = type(self.stage).gives_fitted_pose
+        does = "stays" if stays else "changes"
+        assert fitted != stays, f"gives_fitted_pose is {fitted}, but the pose {does} where the scan lies elsewhere"
 
     @pytest.mark.parametrize("count", [0, 1, 3])
     def test_few_points(self, count: int) -> None:

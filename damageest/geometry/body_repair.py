@@ -5,18 +5,14 @@ The steps of `damageest.geometry.healing.heal`, also useful alone. Coordinates m
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, open_edges
+from damageest.artefacts import Flags, Floats, Ints, open_edges
 from damageest.errors import InputError
 from damageest.geometry.bodies import label_pieces
-from damageest.geometry.duplicates import list_used
+from damageest.geometry.shells import Shells, drop_unused_vertices, label_components, to_body
 from damageest.geometry.slivers import find_slivers
-
-_MOST_PAIRS = 5000
-"""Pairs of bodies with overlapping bounds up to which each pair is compared; above it all bodies are united at once."""
+from damageest.geometry.solids import to_arrays
 
 
 def _pair_neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
@@ -36,24 +32,13 @@ def _pair_neighbours(faces: Ints) -> tuple[Ints, Ints, Ints]:
     return owner[two], owner[two + 1], (forward[two] == forward[two + 1]).astype(np.int64)
 
 
-def _label_components(a: Ints, b: Ints, count: int) -> tuple[Ints, int]:
-    """Component (count,) of each of ``count`` nodes under the links from ``a`` to ``b``, and how many there are."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    bodies, label = connected_components(
-        coo_matrix((np.ones(len(a), bool), (a, b)), shape=(count, count)), directed=False
-    )
-    return label.astype(np.int64), int(bodies)
-
-
 def label_bodies(faces: Ints) -> tuple[Ints, int]:
     """The body (F,) of each of the faces (F,3), numbered from 0, and the number of bodies.
 
     Two triangles belong to one body if they are connected over edges that exactly two triangles share.
     """
     a, b, _ = _pair_neighbours(faces)
-    return _label_components(a, b, len(faces))
+    return label_components(a, b, len(faces))
 
 
 def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
@@ -70,7 +55,7 @@ def orient_faces(faces: Ints) -> tuple[Ints, int | None]:
         return faces, 0
     a, b, differ = _pair_neighbours(faces)
     n = len(faces)
-    label, _ = _label_components(
+    label, _ = label_components(
         np.concatenate([a, a + n]), np.concatenate([b + n * differ, b + n * (1 - differ)]), 2 * n
     )
     as_read, turned = label[:n], label[n:]
@@ -103,22 +88,6 @@ def signed_volumes(vertices: Floats, faces: Ints, label: Ints, count: int) -> Fl
     return np.bincount(label, each, minlength=count).astype(np.float64)
 
 
-def _to_manifold(vertices: Floats, faces: Ints) -> Any:
-    """The mesh as a manifold3d body, whose status the caller checks; coordinates should be near the origin."""
-    import manifold3d as m3
-
-    # copies, because manifold3d rejects read-only arrays, as those of artefacts are
-    return m3.Manifold(
-        m3.Mesh64(np.array(vertices, dtype=np.float64, order="C"), np.array(faces, dtype=np.uint64, order="C"))
-    )
-
-
-def _to_arrays(body: Any) -> tuple[Floats, Ints]:
-    """Vertices (V,3) and faces (F,3) of a manifold3d body."""
-    mesh = body.to_mesh64()
-    return np.asarray(mesh.vert_properties, dtype=np.float64)[:, :3], np.asarray(mesh.tri_verts).astype(np.int64)
-
-
 def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
     """The mesh (V,3), (F,3) with vertices of its own for each sheet where an even number of triangles, four or more,
     meet at an edge, as where two cubes touch along an edge.
@@ -130,22 +99,27 @@ def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floa
         return vertices, faces
     import manifold3d as m3
 
-    body = _to_manifold(vertices, faces)
+    body = to_body(vertices, faces)
     if body.status() != m3.Error.NoError or body.is_empty():
         return vertices, faces
-    new_vertices, new_faces = _to_arrays(body)
+    new_vertices, new_faces = to_arrays(body)
     if open_edges(new_faces):
         return vertices, faces
     notes.append("doubled the vertices of edges where more than two triangles meet")
     return new_vertices, new_faces
 
 
-def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str], gap: float = 0.0) -> tuple[Floats, Ints]:
+def resolve_bodies(
+    vertices: Floats, faces: Ints, notes: list[str], gap: float = 0.0, outward: bool = False
+) -> tuple[Floats, Ints]:
     """A mesh (V,3), (F,3) of the same bodies with faces outward, cavities inward and overlapping bodies united.
 
-    The mesh given must be closed, with consistent windings in each body. Bodies without volume are dropped. ``notes``
-    gets a line for each change, and one on separate bodies and cavities that are kept. ``gap``: how far the triangles
-    may lie off the surface that they stand for: a union leaves no cavities that are thinner.
+    The mesh given must be closed, with consistent windings in each body. Which way a shell faces is decided by where it
+    lies, not by its windings: shells in no other one are bodies, those in a body are its cavities, those in a cavity
+    bodies again. Bodies without volume are dropped. ``notes`` gets a line for each change, and one on separate bodies
+    and cavities that are kept. ``gap``: how far the triangles may lie off the surface that they stand for: a union
+    leaves no cavities that are thinner. ``outward``: the windings are those of a CAD kernel, where a shell in a body
+    that faces outward is a body of its own, which is united with the other.
 
     Raises InputError where no body has volume, or where bodies overlap but cannot be united.
     """
@@ -162,122 +136,46 @@ def resolve_bodies(vertices: Floats, faces: Ints, notes: list[str], gap: float =
         faces = faces[~flat[label]]
         label, count = label_bodies(faces)
         volumes = signed_volumes(vertices, faces, label, count)
-    depth, crossing = _find_nesting(vertices, faces, label, count)
-    if not crossing:
-        top = depth == 0
-        if (volumes[top] < 0).all():
-            faces, volumes = faces[:, ::-1], -volumes
-            notes.append("reversed all triangles: they faced inward")
-        wrong = top & (volumes < 0)
-        if wrong.any():
-            faces, volumes = _reverse_faces(faces, wrong[label]), np.abs(volumes) * np.where(wrong, 1, np.sign(volumes))
-            notes.append(f"reversed the triangles of {int(wrong.sum())} of {count} bodies: they faced inward")
-        if ((volumes > 0) == (depth % 2 == 0)).all():
-            cavities = int((volumes < 0).sum())
-            if count - cavities > 1:
-                notes.append(f"{count - cavities} separate bodies, kept as one part")
-            if cavities:
-                notes.append(f"{cavities} inner cavit{'ies' if cavities > 1 else 'y'}, kept")
-            return _drop_unused_vertices(vertices, faces)
-    return _unite(vertices, faces, label, volumes, notes, gap)
-
-
-def _reverse_faces(faces: Ints, which: Any) -> Ints:
-    """The faces with the winding of some of them reversed."""
-    faces = faces.copy()
-    faces[which] = faces[which][:, ::-1]
-    return faces
-
-
-def _drop_unused_vertices(vertices: Floats, faces: Ints) -> tuple[Floats, Ints]:
-    """The same mesh without vertices that no face uses."""
-    used = list_used(faces)
-    if len(used) == len(vertices):
-        return vertices, faces
-    index = np.zeros(len(vertices), np.int64)
-    index[used] = np.arange(len(used))
-    return vertices[used], index[faces]
-
-
-def _find_nesting(vertices: Floats, faces: Ints, label: Ints, count: int) -> tuple[Ints, bool]:
-    """In how many other bodies each body lies (count,), and whether any two cross or touch.
-
-    Two bodies are disjoint if the volume of their union is the sum of their volumes, and nested if it is the larger of
-    the two. A smaller surface area of the union shows that they touch.
-    """
-    depth = np.zeros(count, np.int64)
-    if count == 1:
-        return depth, False
-    corners = vertices[faces]
-    order = np.argsort(label, kind="stable")
-    starts = np.searchsorted(label[order], np.arange(count))
-    low = np.minimum.reduceat(corners.min(1)[order], starts)
-    high = np.maximum.reduceat(corners.max(1)[order], starts)
-    pairs = [
-        (i, int(j))
-        for i in range(count - 1)
-        for j in i + 1 + np.flatnonzero(((low[i] <= high[i + 1 :]) & (low[i + 1 :] <= high[i])).all(1))
-    ]
-    if len(pairs) > _MOST_PAIRS:
-        return depth, True
-    origin = (vertices.min(0) + vertices.max(0)) / 2
-    solids: dict[int, Any] = {}
-    for i in {k for pair in pairs for k in pair}:
-        v, f = _drop_unused_vertices(vertices - origin, faces[label == i])
-        body = _to_manifold(v, f)
-        solids[i] = body if body.volume() > 0 else _to_manifold(v, f[:, ::-1])
-    for i, j in pairs:
-        a, b = solids[i], solids[j]
-        both = (a + b).volume()
-        area = (a + b).surface_area()
-        va, vb = a.volume(), b.volume()
-        small = 1e-9 * (va + vb)
-        if abs(both - va - vb) <= small:
-            if area < (a.surface_area() + b.surface_area()) * (1 - 1e-9):
-                return depth, True
-        elif abs(both - max(va, vb)) <= small:
-            if abs(area - (a if va > vb else b).surface_area()) > 1e-9 * area:
-                return depth, True
-            depth[i if va < vb else j] += 1
-        else:
-            return depth, True
-    return depth, False
-
-
-def _unite(
-    vertices: Floats, faces: Ints, label: Ints, volumes: Floats, notes: list[str], gap: float
-) -> tuple[Floats, Ints]:
-    """The union of the bodies that face outward, minus the union of those that face inward. The faces of each body are
-    those with its ``label`` (F,); ``volumes`` are signed."""
-    import manifold3d as m3
-
-    if (volumes < 0).all():
-        faces, volumes = faces[:, ::-1], -volumes
-        notes.append("reversed all triangles: they faced inward")
-    origin = (vertices.min(0) + vertices.max(0)) / 2
-    gathered: dict[bool, list[Any]] = {True: [], False: []}
-    for i, volume in enumerate(volumes):
-        mesh = faces[label == i]
-        v, f = _drop_unused_vertices(vertices - origin, mesh if volume > 0 else mesh[:, ::-1])
-        body = _to_manifold(v, f)
-        if body.status() != m3.Error.NoError:
-            raise InputError(
-                f"{len(volumes)} of its bodies overlap, and one of them is not a solid ({body.status()}); "
-                "unite them in the CAD system and export again"
-            )
-        gathered[bool(volume > 0)].append(body)
-    result = m3.Manifold.batch_boolean(gathered[True], m3.OpType.Add)
-    if gathered[False]:
-        result -= m3.Manifold.batch_boolean(gathered[False], m3.OpType.Add)
-    if result.status() != m3.Error.NoError or result.is_empty():
-        raise InputError("its overlapping bodies could not be united; unite them in the CAD system and export again")
-    new_vertices, new_faces = _to_arrays(result)
-    notes.append(f"united {len(volumes)} bodies that overlap, touch or lie in one another into one part")
+    shells = Shells(vertices, faces, label, volumes > 0)
+    shells.relate(outward)
+    _note_turned(shells, notes)
+    if shells.are_apart:
+        wrong = shells.faces_out != shells.should_face_out
+        cavities = int((~shells.should_face_out).sum())
+        if count - cavities > 1:
+            notes.append(f"{count - cavities} separate bodies, kept as one part")
+        if cavities:
+            notes.append(f"{cavities} inner cavit{'ies' if cavities > 1 else 'y'}, kept")
+        return drop_unused_vertices(vertices, _reverse_faces(faces, wrong[label]) if wrong.any() else faces)
+    new_vertices, new_faces = shells.unite()
+    notes.append(f"united {count} bodies that overlap, touch or lie in one another into one part")
     slivers = find_slivers(new_vertices, new_faces, gap)
     if slivers.all():
         raise InputError("encloses no volume: all its bodies are flat; a part must be a solid")
     if slivers.any():
-        count = len(np.unique(label_pieces(new_faces)[slivers]))
-        notes.append(f"dropped {count} slivers between them, thinner than their triangles are exact")
-        new_vertices, new_faces = _drop_unused_vertices(new_vertices, new_faces[~slivers])
-    return new_vertices + origin, new_faces
+        dropped = len(np.unique(label_pieces(new_faces)[slivers]))
+        notes.append(f"dropped {dropped} slivers between them, thinner than their triangles are exact")
+        new_vertices, new_faces = drop_unused_vertices(new_vertices, new_faces[~slivers])
+    return new_vertices, new_faces
+
+
+def _note_turned(shells: Shells, notes: list[str]) -> None:
+    """A line on shells whose faces are turned."""
+    wrong, top = shells.faces_out != shells.should_face_out, shells.should_face_out
+    count = len(wrong)
+    if wrong.all():
+        notes.append("reversed all triangles: they faced inward")
+    elif (wrong & top).any():
+        notes.append(f"reversed the triangles of {int((wrong & top).sum())} of {count} bodies: they faced inward")
+    if not wrong.all() and (turned := int((wrong & ~top).sum())):
+        notes.append(
+            f"reversed the triangles of {turned} shell{'s' * (turned > 1)} inside a body, which faced outward as a "
+            f"body does: taken for {'cavities' if turned > 1 else 'a cavity'}"
+        )
+
+
+def _reverse_faces(faces: Ints, which: Flags) -> Ints:
+    """The faces with the winding of some of them reversed."""
+    faces = faces.copy()
+    faces[which] = faces[which][:, ::-1]
+    return faces

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Flags, Floats
 
 MOST = 40_000
 """Points that directions are tried with."""
@@ -22,6 +22,10 @@ WIDTH = 5.0
 """Radius of a patch, in steps; smaller ones show a single terrace."""
 AGREE = 0.6
 """Least deviation of sloping patches, in that of terraces."""
+ON_VALUES = 0.8
+"""Share of a patch's points that have a value that many have, where its depth is in steps."""
+MOST_SMOOTH = 0.1
+"""Largest share of small patches that are exactly plane and no terraces."""
 REGULAR = 0.7
 """Share of the differences between values that must be multiples of the step, to 15 %."""
 FLAT = 1e-4
@@ -58,18 +62,14 @@ def measure_depth_step(
     # All points around few places: a tree over very many points takes seconds.
     tree = cKDTree(points - middle if len(points) <= 5 * MOST else some)
     candidates += [(some @ way, np.broadcast_to(way, some.shape)) for way in _find_terraces(tree, some)]
-    steps = [(step, way) for values, way in candidates if (step := _find_step(values))]
-    return max((step for step, way in steps if _is_terraced(tree, some, way, step)), default=0.0)
+    found = [(*_find_step(values), way) for values, way in candidates]
+    return max((step for step, on, way in found if step and _is_terraced(tree, some, way, step, on)), default=0.0)
 
 
 def _find_terraces(tree: object, some: Floats) -> list[Floats]:
     """Up to two normals (3,) that many small, exactly plane patches have in common; none along an axis."""
-    _, index = tree.query(some[: 5 * PATCHES], k=12)  # type: ignore[attr-defined]
-    around = tree.data[index]  # type: ignore[attr-defined]
-    around = around - around.mean(axis=1, keepdims=True)
-    spread, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", around, around))
-    plane = (spread[:, 0] < FLAT**2 * spread[:, 1]) & (spread[:, 1] > 0.02 * spread[:, 2])
-    normals = axes[plane, :, 0]
+    plane, normals = _find_planes(tree, some[: 5 * PATCHES])
+    normals = normals[plane]
     found: list[Floats] = []
     while len(found) < 2 and len(normals) >= 20:
         alike = np.abs(normals @ normals.T) > 1 - 1e-5
@@ -83,12 +83,23 @@ def _find_terraces(tree: object, some: Floats) -> list[Floats]:
     return found
 
 
-def _find_step(values: Floats) -> float:
-    """The typical difference between the values that many of the points share; 0 where there are few such values."""
-    extent = float(np.ptp(values))
+def _find_planes(tree: object, places: Floats) -> tuple[Flags, Floats]:
+    """Whether the smallest patch around each place (M,3) is exactly plane, and its normal (M,3)."""
+    _, index = tree.query(places, k=12)  # type: ignore[attr-defined]
+    around = tree.data[index]  # type: ignore[attr-defined]
+    around = around - around.mean(axis=1, keepdims=True)
+    spread, axes = np.linalg.eigh(np.einsum("mki,mkj->mij", around, around))
+    return (spread[:, 0] < FLAT**2 * spread[:, 1]) & (spread[:, 1] > 0.02 * spread[:, 2]), axes[:, :, 0]
+
+
+def _find_step(values: Floats) -> tuple[float, Flags]:
+    """The typical difference between the values (N,) that many of the points share, 0 where there are few such values;
+    and whether each point has one of them."""
+    extent, none = float(np.ptp(values)), np.zeros(len(values), bool)
     if not extent > 0:
-        return 0.0
-    values = np.sort(values)
+        return 0.0, none
+    order = np.argsort(values)
+    values = values[order]
     group = np.concatenate([[0], np.cumsum(np.diff(values) > SAME * extent)])
     count = np.bincount(group)
     many = count >= POINTS_PER_VALUE
@@ -96,16 +107,30 @@ def _find_step(values: Floats) -> float:
     last = np.cumsum(count) - 1
     many &= values[last] - values[last - count + 1] < 10 * SAME * extent
     if many.sum() < MIN_VALUES or count[many].sum() < MIN_SHARE * len(values):
-        return 0.0
+        return 0.0, none
+    on = none.copy()
+    on[order] = many[group]
     gaps = np.diff(values[last[many]])
     step = float(np.median(gaps))
     times = gaps / step
     regular = (np.abs(times - np.rint(times)) < 0.15) & (times > 0.5)
-    return step if regular.mean() >= REGULAR else 0.0
+    return (step if regular.mean() >= REGULAR else 0.0), on
 
 
-def _is_terraced(tree: object, some: Floats, way: Floats, step: float) -> bool:
-    """Whether sloping surface deviates from a smooth one as it does with depth in steps along ``way`` (N,3)."""
+def _is_terraced(tree: object, some: Floats, way: Floats, step: float, on: Flags) -> bool:
+    """Whether sloping surface deviates from a smooth one as it does with depth in steps along ``way`` (N,3).
+
+    ``on`` (N,): which points have a value that many have. Across an edge, a surface deviates as much. But where only a
+    wall is in rows along ``way``, and what it meets is not, few points of a patch are ``on``; and where nothing has
+    noise, walls are exactly plane in the small.
+    """
+    from scipy.spatial import cKDTree
+
+    shown = cKDTree(some)
+    plane, normals = _find_planes(tree, some[:PATCHES])
+    smooth = plane & (np.abs(np.einsum("ij,ij->i", normals, way[:PATCHES])) < SLOPE[1])
+    if smooth.mean() > MOST_SMOOTH:
+        return False
     reach = WIDTH * step
     rng = np.random.default_rng(1)
     ratios = []
@@ -120,6 +145,9 @@ def _is_terraced(tree: object, some: Floats, way: Floats, step: float) -> bool:
         axes = np.linalg.eigh(local.T @ local)[1]
         cosine = abs(float(axes[:, 0] @ direction))
         if not SLOPE[0] < cosine < SLOPE[1]:
+            continue
+        if on[shown.query_ball_point(place, reach)].mean() < ON_VALUES:
+            ratios.append(0.0)
             continue
         u, v = (local @ axes[:, 1:]).T / reach
         basis = np.linalg.qr(np.column_stack([np.ones_like(u), u, v, u * u, u * v, v * v])).Q

@@ -16,14 +16,17 @@ _HOLE_AREA = 0.01
 """Largest share of the surface area for the squared diagonal of a hole of more than three edges."""
 
 
-def heal(vertices: Floats, faces: Ints, gap: float = 0.0) -> tuple[Floats, Ints, tuple[str, ...]]:
+def heal(
+    vertices: Floats, faces: Ints, gap: float = 0.0, outward: bool = False
+) -> tuple[Floats, Ints, tuple[str, ...]]:
     """A watertight mesh from one that nearly is: vertices (V,3), faces (F,3), and a note (text) for each repair.
 
     Merges vertices, drops degenerate and duplicate faces, makes windings consistent and outward, closes holes of a few
-    edges, and unites bodies that overlap. Vertices are merged up to 1e-5 of the diagonal of the bounds; holes have
-    three edges, or up to 12 within 1 % of the surface area. ``gap``: how far the triangles may lie off the surface that
-    they stand for; bodies that touch are united without cavities thinner than that. Coordinates may be in any unit and
-    frame, and stay in them.
+    edges, turns shells by where they lie, and unites bodies that overlap. Vertices are merged up to 1e-5 of the
+    diagonal of the bounds; holes have three edges, or up to 12 within 1 % of the surface area. ``gap``: how far the
+    triangles may lie off the surface that they stand for; bodies that touch are united without thinner cavities.
+    ``outward``: the windings are those of a CAD kernel, and a shell in another that faces outward is a body, not a
+    cavity. Coordinates may be in any unit and frame, and stay in them.
 
     Raises InputError, with what is wrong, where and what to do, for a mesh that needs more than that.
     """
@@ -45,7 +48,7 @@ def heal(vertices: Floats, faces: Ints, gap: float = 0.0) -> tuple[Floats, Ints,
         vertices, faces = split_pinches(vertices, faces, notes)
     if open_edges(faces):
         raise InputError(_describe_open(vertices, faces))
-    vertices, faces = resolve_bodies(vertices, faces, notes, gap)
+    vertices, faces = resolve_bodies(vertices, faces, notes, gap, outward)
     return vertices, faces, tuple(notes)
 
 

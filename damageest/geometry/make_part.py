@@ -63,7 +63,7 @@ def make_part(
     try:
         if repair:
             given = Mesh(v, f) if faces_brep is not None and len(f) and np.isfinite(v).all() else None
-            v, f, made = heal(v, f, tessellation_error)
+            v, f, made = heal(v, f, tessellation_error, outward=faces_brep is not None)
             notes = (*notes, *made)
             if given is not None and faces_brep is not None and not np.array_equal(given.faces, f):
                 faces_brep = carry_labels(v, f, given, faces_brep)

@@ -23,6 +23,8 @@ MANY = 20_000
 """Points from which a tree and its queries are made for speed."""
 SOME = 200_000
 """Number of points that tell how dense a scan of more points is."""
+WHOLE = 100_000
+"""Points up to which a tree over all of them is made for a few places: it takes less than to look which are near."""
 
 
 def find_nearby(points: Floats, places: Floats, reach: float) -> Ints:
@@ -58,6 +60,16 @@ def gather_around(points: Floats, places: Floats, count: int, rng: np.random.Gen
     enough = max(3, math.ceil(1.3 * count * len(some) / len(points)))
     reach = query_neighbours(make_tree(some), places, enough + 1)[0][:, -1]
     return find_nearby(points, places, float(np.percentile(reach, 95)))
+
+
+def query_at_few(points: Floats, places: Floats, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
+    """Distances (M,count) and points (M,count,3), relative to the first place, of the nearest of the points (N,3) to
+    each of a few places (M,3), nearest first; of very many points, of nearly every place."""
+    around = points[gather_around(points, places, count, rng)] if len(points) > WHOLE else points
+    middle = places[:1].sum(axis=0)  # far from the origin, products of coordinates lose digits
+    near = around - middle
+    distance, index = query_neighbours(make_tree(near), places - middle, count)
+    return distance, near[index]
 
 
 def find_in_box(points: Floats, low: Floats, high: Floats) -> Ints:

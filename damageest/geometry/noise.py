@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.neighbourhoods import gather_around
+from damageest.geometry.neighbourhoods import gather_around, make_tree
+from damageest.geometry.sheets import query_own_sheet
 
 AUTO_TOLERANCE = 4.0
 """Lambda over the scan's noise where the job says auto: 6 in 100,000 intact points deviate by more."""
@@ -66,10 +67,11 @@ def measure_noise_and_spacing(points: Floats, seed: int = 0) -> tuple[float, flo
                 around = points[gather_around(points, (centres if k <= 64 else some) + middle, gathered, rng)]
             around = around - middle
             tree = cKDTree(around, balanced_tree=False, compact_nodes=False)
-        far, index = (np.asarray(a) for a in tree.query(some, k=k))
+        far, index = query_own_sheet(tree, some, around, k)
         local, roundness = _to_principal_axes(around[index])
         if k <= 64:
-            spacing = _measure_spacing(local[:, :, :2] - local[:, :1, :2]) or spacing
+            # more neighbours can only widen it; where it narrows, they lie on the far side of a bent wall
+            spacing = max(spacing, _measure_spacing(local[:, :, :2] - local[:, :1, :2]))
         even = roundness > 0.15
         # where points lie in rows, a patch has to span several rows before it shows the surface
         if not settled and even.sum() >= 0.3 * len(even):
@@ -93,7 +95,6 @@ def measure_quiet_noise(points: Floats, seed: int = 0) -> float:
     count = _LEVELS[0]
     if len(points) < count:
         return 0.0
-    from scipy.spatial import cKDTree
     from scipy.special import gammaincinv
 
     rng = np.random.default_rng(seed)
@@ -101,7 +102,7 @@ def measure_quiet_noise(points: Floats, seed: int = 0) -> float:
     around = gather_around(points, centres, count, rng) if len(points) > _WHOLE else slice(None)
     middle = centres.mean(axis=0)
     near = points[around] - middle
-    _, index = cKDTree(near, balanced_tree=False, compact_nodes=False).query(centres - middle, k=count)
+    _, index = query_own_sheet(make_tree(near), centres - middle, near, count)
     local, roundness = _to_principal_axes(near[index])
     even = roundness > 0.15  # points in a row say nothing of the surface
     if not even.any():
@@ -109,6 +110,11 @@ def measure_quiet_noise(points: Floats, seed: int = 0) -> float:
     freedom = count - 6
     expected = float(2 * gammaincinv(freedom / 2, QUIET) / freedom)
     return float(np.sqrt(np.quantile(_measure_residual_variance(local[even]), QUIET) / expected))
+
+
+def measure_scatter(patches: Floats) -> Floats:
+    """Standard deviation (m,) of the points of patches (m,k,3), k > 6, from the quadric fitted to each."""
+    return np.asarray(np.sqrt(_measure_residual_variance(_to_principal_axes(patches)[0])))
 
 
 def _to_principal_axes(patches: Floats) -> tuple[Floats, Floats]:

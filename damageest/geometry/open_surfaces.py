@@ -11,7 +11,7 @@ from damageest.artefacts import Floats, Ints, Part, Surface
 from damageest.errors import StageError
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.local_fits import smooth_points
-from damageest.geometry.neighbourhoods import thin_points
+from damageest.geometry.neighbourhoods import make_tree, query_neighbours, thin_points
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.threads import count_threads
 from damageest.geometry.vectors import normalise
@@ -22,6 +22,8 @@ MOST_CELLS = 3e6
 """Cells in the bounding box of a damage, at most. VTK visits each, in about 2 microseconds."""
 FIT_COUNT = 32
 """Neighbours of each local fit."""
+NEAREST = 8
+"""Points whose mean height moves a vertex."""
 
 
 def centre_points(points: Floats) -> Floats:
@@ -80,6 +82,23 @@ def orient_points(points: Floats, part: Part, cell: float, noise: float) -> tupl
     # consistent orientations of all normals.
     hint = 1e-4 * _find_skin_directions(cloud, part)
     return cloud, turn_toward_void(cloud, normals, hint, nothing, nothing, np.empty(0), cell)
+
+
+def draw_to_points(vertices: Floats, faces: Ints, cloud: Floats, normals: Floats) -> Floats:
+    """Vertices (V,3) of an open mesh moved by the mean height of the nearest of its points (M,3) over it, along the
+    mean of their unit normals (M,3).
+
+    What is reconstructed from the planes through the points lies beside them where it is curved, and wider planes lie
+    farther beside. The mesh's own normals would turn from one vertex to the next, and short edges over.
+    """
+    if not len(faces) or len(cloud) <= NEAREST:
+        return vertices
+    height = np.einsum("ij,ij->i", cloud - closest_on_mesh(cloud, Surface(vertices, faces)).place, normals)
+    far, near = query_neighbours(make_tree(cloud), vertices, NEAREST + 1)
+    weight = (1 - far[:, :-1] / np.maximum(far[:, -1:], 1e-300)) ** 2 + 1e-9  # 0 where the next point takes over
+    weight /= weight.sum(axis=1, keepdims=True)
+    way = normalise(np.einsum("vk,vkj->vj", weight, normals[near[:, :-1]]))
+    return np.asarray(vertices + (weight * height[near[:, :-1]]).sum(axis=1)[:, None] * way)
 
 
 def trim_surface(vertices: Floats, faces: Ints, cloud: Floats, reach: float, part: Part, tolerance: float) -> Surface:

@@ -49,12 +49,14 @@ def turn_toward_void(
     )
     nearest = cKDTree(viewpoints).query(points, workers=count_threads())[1]
     evidence = np.einsum("ij,ij->i", normals, toward_lost[nearest] / np.pi + 0.01 * above)
-    return _find_signs(points, normals, evidence)[:, None] * normals
+    return find_signs(points, normals, evidence)[:, None] * normals
 
 
-def _find_signs(points: Floats, normals: Floats, evidence: Floats) -> Floats:
+def find_signs(points: Floats, normals: Floats, evidence: Floats) -> Floats:
     """Sign (N,) of each normal from its neighbours and from its own evidence (N,), which is positive where the normal
     points to the lost side."""
+    if len(points) < 2:
+        return np.where(evidence < 0, -1.0, 1.0)
     distance, index = find_neighbours(points, 11)
     first = np.repeat(np.arange(len(points)), index.shape[1] - 1)
     second = index[:, 1:].ravel()

@@ -116,6 +116,13 @@ def prepare_rays(mesh: Mesh) -> RayCaster:
     return found
 
 
+def measure_thickness(mesh: Mesh, places: Floats, normals: Floats) -> Floats:
+    """The thickness (N,) of a closed mesh below places (N,3) on it, against their outward normals (N,3); inf where a
+    ray meets nothing."""
+    start = places - 1e-5 * mesh.diagonal * normals  # off the face that the place lies on
+    return prepare_rays(mesh).find_first(start, -normals)[0]
+
+
 class _Tree:
     """Triangles (F,3,3) in libigl's tree of boxes, asked as Embree's scene is."""
 

@@ -16,7 +16,7 @@ from damageest.geometry.duplicates import find_members, group_integers
 from damageest.geometry.vectors import measure_longest_edges
 from damageest.isolation.memory import require_memory
 
-BYTES_OF_FACE = 450
+BYTES_OF_FACE = 250
 """Memory of one round of refinement, for each triangle before or after it."""
 BYTES_TO_LOOK = 320
 """Memory of the search for long edges, for each triangle, measured."""

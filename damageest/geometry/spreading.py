@@ -14,7 +14,7 @@ from damageest.geometry.vectors import measure_longest_edges
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.isolation.memory import require_memory
 
-SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 210, 260
+SPREAD_BYTES, THIN_BYTES, TRIANGLE_BYTES = 170, 130, 260
 """Memory to spread a point, to choose from it, and for each triangle, measured."""
 MANY = 300_000
 """Points from which on fewer of them are compared in pairs at first; those that are then too far from all are next."""

@@ -167,6 +167,8 @@ def _find_two_units(ratio: float, here: str) -> tuple[float, float, str] | None:
 
 SMALLEST, LARGEST = 1.0, 200_000.0
 """Millimetres across, beyond which the size of a part is doubtful."""
+TINY = 40.0
+"""Tolerances across a part below which its unit is doubtful: usual are some hundreds, and an inch is 25 millimetres."""
 
 
 def diagnose_size(part_vertices: Floats, unit: str) -> str | None:
@@ -185,6 +187,27 @@ def diagnose_size(part_vertices: Floats, unit: str) -> str | None:
     return (
         f"the part is {shown} across; is `units: {here}` right? Set it to the unit of the numbers in part and scan, or "
         "give  unit: ...  for each of them"
+    )
+
+
+def describe_size(points: Floats, unit: str, clip: float = 0.0) -> str:
+    """The size of points (N,3) along the axes of their frame, in words: '40 x 30 x 20 mm'; without the share ``clip``
+    of them at either end, as strays are."""
+    if not len(points):
+        return f"0 {unit}"
+    low, high = np.quantile(points, [clip, 1 - clip], axis=0)
+    return " x ".join(f"{length:.3g}" for length in high - low) + f" {unit}"
+
+
+def question_size(tolerance: float, part_vertices: Floats, unit: str) -> str | None:
+    """A message where a part is so small against the tolerance that the job's unit is doubtful, None where it is not:
+    part and scan of one wrong unit agree with each other."""
+    across = float(np.linalg.norm(np.ptp(part_vertices, axis=0))) if len(part_vertices) else 0.0
+    if not 0 < across < TINY * tolerance:
+        return None
+    return (
+        f"the part is {describe_size(part_vertices, unit)}, only {across / tolerance:.2g} tolerances of {tolerance:.3g}"
+        f" {unit} across; is `units: {unit}` right for the numbers of part and scan, and is the tolerance in it?"
     )
 
 

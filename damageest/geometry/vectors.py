@@ -28,3 +28,10 @@ def measure_longest_edges(triangles: Floats) -> Floats:
         x, y, z = (triangles[:, k] - triangles[:, k - 1]).T
         squares.append(x * x + y * y + z * z)
     return np.asarray(np.sqrt(np.maximum(np.maximum(squares[0], squares[1]), squares[2])))
+
+
+def spread_directions(count: int) -> Floats:
+    """Unit vectors (count,3), evenly over the sphere: a Fibonacci lattice."""
+    step = np.arange(count) + 0.5
+    polar, azimuth = np.arccos(1 - 2 * step / count), np.pi * (1 + 5**0.5) * step
+    return np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)], axis=1)

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.artefacts import Flags, Reason, Singles
+from damageest.artefacts import Flags, Floats, Reason, Singles
 from damageest.errors import InputError
 from damageest.geometry.units import FULL_NAMES, canonical_unit
 from damageest.io.points.attributes import CONFIDENCE
@@ -114,6 +114,27 @@ class ConfidenceCount:
         if self._without:
             text += f"; {self._without} points of other files have none, and are used"
         return (Reason("low_confidence", text, amount=self._low),)
+
+
+COARSE = 20_000
+"""Steps across a scan below which its numbers are said to be coarse: a noise of 1/5000 of the size is one of four."""
+
+
+def describe_coarse(points: Floats, path: Path) -> Reason | None:
+    """A warning where the coordinates (N,3) of a file, as in it, are in single precision and so far from the origin
+    that they stand in steps; None for others."""
+    known = points[np.isfinite(points).all(axis=1)]
+    if not len(known) or np.abs(known).max() > np.finfo(np.float32).max:
+        return None
+    far, size = np.abs(known).max(axis=0), float(np.ptp(known, axis=0).max())
+    step = float(np.spacing(far.astype(np.float32)).max())
+    if not 0 < size < COARSE * step or not np.array_equal(known, known.astype(np.float32)):
+        return None
+    text = (
+        f"{path.name}: its coordinates are in single precision and up to {far.max():.4g} from the origin: they stand "
+        f"in steps of {step:.2g}, with {size / step:.0f} steps across the scan"
+    )
+    return Reason("coarse_numbers", text, amount=step, remedy="move the scan near the origin before it is exported")
 
 
 def _list_names(names: list[str]) -> str:

@@ -10,13 +10,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from damageest.artefacts import Bytes, Floats, Ints, Scan, Singles, Vector
+from damageest.artefacts import Bytes, Floats, Ints, Reason, Scan, Singles, Vector
 from damageest.errors import InputError
 from damageest.geometry.duplicates import find_duplicates
+from damageest.geometry.stacks import find_stacks
 from damageest.geometry.units import FARTHEST, canonical_unit, unit_factor
 from damageest.io.file_memory import require_memory_for
 from damageest.io.points import PointFile, read_points
-from damageest.io.scan_notes import ConfidenceCount, UnitNotes
+from damageest.io.scan_notes import ConfidenceCount, UnitNotes, describe_coarse
 
 GREY = 128
 """Colour of the points of a file without colours, beside files with."""
@@ -78,14 +79,35 @@ def make_scan(
     if len(keep) < len(scan.points):
         notes = (*notes, f"removed {len(scan.points) - len(keep)} duplicate points")
         scan = scan.take(keep)
+    scan, made = average_stacks(scan)
+    notes = (*notes, *made)
     normals = scan.normals
     if normals is not None:
         length = np.linalg.norm(normals, axis=1, keepdims=True)
-        if np.isfinite(length).all() and length.min() > 1e-6:
+        wrong = int((~(length > 1e-6) | ~np.isfinite(length)).sum())
+        if not wrong:
             normals = normals / length
         else:
-            notes, normals = (*notes, "some normals are zero or not finite; no normals are used"), None
+            which = "all" if wrong == len(normals) else f"{wrong:,} of {len(normals):,}"
+            notes, normals = (*notes, f"{which} normals are zero or not finite; no normals are used"), None
     return replace(scan, normals=normals, notes=notes)
+
+
+def average_stacks(scan: Scan) -> tuple[Scan, tuple[str, ...]]:
+    """The scan with the points of each stack (see `damageest.geometry.stacks`) averaged, and a note where it has some.
+    What a point has besides its place is that of the first of its stack."""
+    found = find_stacks(scan.points)
+    if found is None:
+        return scan, ()
+    label, reach = found
+    count = np.bincount(label)
+    means = np.stack([np.bincount(label, scan.points[:, axis]) for axis in range(3)], axis=1) / count[:, None]
+    averaged = replace(scan.take(np.unique(label, return_index=True)[1]), points=means)
+    note = (
+        f"{len(scan.points):,} points lie in {len(count):,} stacks, up to {count.max()} points within {reach:.2g} "
+        f"{scan.unit} of each other, as of repeated exposures: each stack counts as one point, its mean"
+    )
+    return averaged, (note,)
 
 
 def _check_views(
@@ -131,9 +153,15 @@ def read_scan(
     clouds: list[PointFile] = []
     positions: list[Floats] = []
     views: list[Ints] = []
+    meant: list[str] = []
+    doubts: list[Reason] = []
     for path, given in zip(paths, viewpoints or [None] * len(paths), strict=True):
         cloud = read_points(path, columns)
         notes.extend(f"{path.name}: {note}" if len(paths) > 1 else note for note in cloud.notes)
+        if coarse := describe_coarse(cloud.points, path):
+            doubts.append(coarse)
+        if cloud.columns:
+            meant.append(f"{path.name}: {cloud.columns}")
         factor = unit_factor(units.settle(path, cloud.unit, cloud.unit_said), unit)
         at, view = cloud.viewpoints, cloud.view
         if given is not None:
@@ -171,7 +199,7 @@ def read_scan(
         confidence=single,
         cloud=number_clouds(views),
     )
-    return replace(scan, warnings=(*units.warnings(), *confidence.warnings()))
+    return replace(scan, warnings=(*units.warnings(), *confidence.warnings(), *doubts), columns=tuple(meant))
 
 
 def join_attributes(pieces: Sequence[PointFile | Scan]) -> tuple[Bytes | None, Singles | None]:

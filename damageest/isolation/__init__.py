@@ -7,6 +7,7 @@ from damageest.isolation.notes import at_work, find_place
 from damageest.isolation.one_thread import ONE_THREAD, keep_one_thread
 from damageest.isolation.parent import end_with_parent
 from damageest.isolation.serve import Usage
+from damageest.isolation.telling import listen, tell_part
 from damageest.isolation.worker import call_isolated, cpu_seconds, end_workers
 
 __all__ = [
@@ -23,7 +24,9 @@ __all__ = [
     "format_bytes",
     "keep_one_thread",
     "limit_this_process",
+    "listen",
     "measure_free_memory",
     "parse_memory",
     "require_memory",
+    "tell_part",
 ]

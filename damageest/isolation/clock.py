@@ -20,10 +20,26 @@ class Clock:
     Without one they are ones of the clock on the wall.
     """
 
-    def __init__(self, page: Page, process: int | None = None) -> None:
-        self._page, self._process = page, process
+    @property
+    def what(self) -> str:
+        """What was at work at the last look."""
+        return self._entry.what
+
+    @property
+    def used(self) -> float:
+        """Processor seconds of the process until the last look."""
+        return self._last - self._first
+
+    def is_exhausted(self) -> bool:
+        """Whether the process has used the processor seconds that it has for the whole call."""
+        return bool(self._whole) and self._measure() is not None and self.used > self._whole
+
+    def __init__(self, page: Page, process: int | None = None, whole: float = 0.0) -> None:
+        """``whole``: processor seconds that the process has for all of the call; 0 for no limit."""
+        self._page, self._process, self._whole = page, process, whole
         self._entry = page.read()
         self._start()
+        self._first = self._last = self._used or 0.0
 
     def _start(self) -> None:
         self._spent, self._before, self._used = 0.0, time.monotonic(), self._measure()
@@ -55,4 +71,5 @@ class Clock:
             times = psutil.Process(self._process).cpu_times()
         except psutil.Error:
             return None
-        return float(times.user + times.system)
+        self._last = float(times.user + times.system)
+        return self._last

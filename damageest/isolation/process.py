@@ -19,7 +19,7 @@ from typing import Any
 
 from damageest.errors import StageError
 from damageest.isolation import portable, transfer
-from damageest.isolation.clock import TICK, Clock
+from damageest.isolation.clock import TICK, WALL, Clock
 from damageest.isolation.limits import Limits
 from damageest.isolation.notes import Page
 from damageest.isolation.one_thread import ONE_THREAD
@@ -48,6 +48,7 @@ class Call:
     show: bool
     nested: bool
     processor_time: bool
+    watch: Callable[[str], None] | None = None
 
 
 @dataclass(frozen=True)
@@ -62,10 +63,11 @@ class Answer:
 
 
 class Ended(Exception):  # noqa: N818
-    """The process gives no answer: it has ended, or is late after ``seconds``, the limit of the call or of a step."""
+    """The process gives no answer: it has ended, or is late after ``seconds``, the limit of the call or of a step.
+    ``used``: processor seconds, where these are limited."""
 
     def __init__(self, seconds: float = 0.0, is_step: bool = False) -> None:
-        self.seconds, self.is_step = seconds, is_step
+        self.seconds, self.is_step, self.used = seconds, is_step, 0.0
 
 
 class WorkerProcess:
@@ -129,17 +131,23 @@ class WorkerProcess:
 
     def ask(self, call: Call, memory: int) -> Answer:
         """What it answers. Raises Ended where it gives no answer."""
-        clock = Clock(self.page, self._process.pid if call.processor_time else None)
+        whole = call.limits.seconds if call.processor_time else 0.0
+        clock = Clock(self.page, self._process.pid if call.processor_time else None, whole)
         try:
             send(self._open_channel, (sys.path, memory, call.nested))
             send(self._open_channel, (call.function, dict(call.arguments)))
-            self._wait(call.limits.seconds, clock)
+            self._wait(whole * WALL or call.limits.seconds, clock, call.watch)
             kind, value, what, usage = receive(self._open_channel, copy=True)
         except (EOFError, ConnectionError):
-            raise Ended from None
+            end = Ended()
+            end.used = clock.used
+            raise end from None
+        except Ended as end:
+            end.used = clock.used
+            raise
         return Answer(kind, value, what, usage, memory)
 
-    def _wait(self, seconds: float, clock: Clock | None = None) -> None:
+    def _wait(self, seconds: float, clock: Clock | None = None, watch: Callable[[str], None] | None = None) -> None:
         """Waits for an answer. Raises Ended where there is none in time, or the process has ended."""
         end = time.monotonic() + seconds if seconds else float("inf")
         with _Selector() as selector:  # not select(): it takes no file numbers above 1023
@@ -155,6 +163,10 @@ class WorkerProcess:
                     raise Ended(seconds)
                 if clock and (late := clock.find_late()):
                     raise Ended(late.seconds, is_step=True)
+                if clock and clock.is_exhausted():
+                    raise Ended(clock.used)
+                if clock and watch:
+                    watch(clock.what)
 
     def interrupt(self) -> None:
         """Kills the process and what it started, from any thread; who waits for it finds that it has ended."""

@@ -39,6 +39,7 @@ def call_isolated(
     nested: bool = False,
     processor_time: bool = False,
     tell: Callable[[Usage], None] | None = None,
+    watch: Callable[[str], None] | None = None,
 ) -> T:
     """``function(**arguments)`` in a worker process, which stays for the next call with the same name ``worker``.
 
@@ -51,7 +52,8 @@ def call_isolated(
     error stream of this process when the call ends. ``stays``: without it the process serves this call alone.
     ``nested``: isolated calls of the function have processes of their own; without it they are ordinary calls.
     ``processor_time``: the time limits of what is noted are ones of processor time, since a busy machine is no reason
-    to end it. ``tell`` gets what the call used, where it gave a value or raised.
+    to end it; so is that of ``limits`` then. ``tell`` gets what the call used; where the process was ended or crashed,
+    only if its processor time is limited. ``watch`` gets what is noted, about twice a second.
 
     Raises StageError, most often ProcessError, where the process crashes or exits, or passes a limit.
     """
@@ -63,7 +65,7 @@ def call_isolated(
         found = _workers.get(key)
         if found is None:
             found = _workers[key] = _Worker()
-    call = Call(function, arguments, limits or Limits(), owner, show, nested, processor_time)
+    call = Call(function, arguments, limits or Limits(), owner, show, nested, processor_time, watch)
     try:
         answer = found.answer(call, tell)
     finally:
@@ -115,6 +117,8 @@ class _Worker:
                 status = None if end.seconds else process.wait_for_end()
                 what = process.page.read().what
                 process.kill()
+                if tell and call.processor_time:
+                    tell(Usage(end.used, None))
                 limits = Limits(call.limits.memory, end.seconds) if end.is_step else call.limits
                 error = describe_end(status, process.take_output(), memory, limits, call.owner)
                 set_place(error, what)

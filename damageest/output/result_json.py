@@ -212,6 +212,11 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
     return filled.model_dump(mode="json", by_alias=True)
 
 
+def to_dict(result: Result, what: str, site: int | None) -> dict[str, Any]:
+    """The content of result.json without files, as a conversion of a result."""
+    return build_report(result)
+
+
 def _to_quaternion(T: Floats) -> tuple[float, float, float, float]:
     from scipy.spatial.transform import Rotation
 

@@ -134,11 +134,14 @@ class SiteReport(JsonModel):
     depth_95: ReportedInterval | None = Field(description="95 % interval of the largest depth, before a cut-back")
     uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="of the inner damage surface")
-    max_depth: float = Field(description="of the scan below the nominal surface")
+    max_depth: float = Field(description="of the scan below the lost skin")
     volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
     centroid: Vector
     bounds: tuple[Vector, Vector]
-    method: str = Field(description="surface: site by site; otherwise the implementation that took all sites at once")
+    method: str = Field(
+        description="surface: site by site; rays: a whole body of the part; pore: a closed cavity inside the metal; "
+        "otherwise the implementation that took all sites at once"
+    )
     evidence: EvidenceReport
     verdict: VerdictReport
     accepted: bool = Field(description="whether it is part of damage_volume; a doubtful site is where the job says so")

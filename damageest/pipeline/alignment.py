@@ -5,12 +5,13 @@ from __future__ import annotations
 from contextlib import suppress
 
 from damageest.artefacts import Pose
-from damageest.checks.scan_quality import require_above_noise, require_tolerance, require_walls
+from damageest.checks.scan_quality import raise_tolerance, require_above_noise, require_tolerance, require_walls
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import AUTO_TOLERANCE
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.prepare import say_columns
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import step
 from damageest.stages.adapt import Adapt
@@ -18,13 +19,16 @@ from damageest.stages.align import Align
 
 COARSE = 4.0
 """How many tolerances a deformed part may lie off the part as designed, for its pose to be found."""
+NO_NOISE, FAR_MORE = 1e-4, 3.0
+"""Noise in spacings up to which a scan shows none, as one whose points lie on facets; and by how many times the
+tolerance has to become larger for the pose to be found again."""
 MEASURED = 20_000
 """Points, about, that the noise is measured with in the pose."""
 
 
 @step(
     gives=("pose", "refusal"),
-    reads=("adapter", "tolerance", "asked_tolerance", "noise", "part", "scan"),
+    reads=("adapter", "tolerance", "asked_tolerance", "noise", "spacing", "part", "scan"),
     calls=(Align,),
 )
 def align_scan(engine: Engine, state: JobState) -> tuple[Pose, StageError | None]:
@@ -38,8 +42,9 @@ def align_scan(engine: Engine, state: JobState) -> tuple[Pose, StageError | None
             check_noise(engine, state)
     try:
         pose: Pose = engine.call(Align, state).get(Align.gives)
-        return pose, None
+        return _align_again(engine, state, pose), None
     except StageError as refusal:
+        refusal.message += say_columns(state.scan)
         if Adapt in engine.job.given or state.adapter is None or not state.adapter.deforms:
             raise
         coarse = state.with_named("tolerance", COARSE * state.tolerance, state.key("tolerance") + " coarse")
@@ -48,6 +53,21 @@ def align_scan(engine: Engine, state: JobState) -> tuple[Pose, StageError | None
         except StageError:
             raise refusal from None
         return pose, refusal
+
+
+def _align_again(engine: Engine, state: JobState, pose: Pose) -> Pose:
+    """The pose in the tolerance that `auto` is raised to, where the noise of the scan says nothing: a scan that was
+    meshed by the scanner's software has none, and its first tolerance is far too small to tell wear from form."""
+    if state.asked_tolerance is not None or state.noise > NO_NOISE * state.spacing:
+        return pose
+    points = move_points(state.scan.points[:: max(1, len(state.scan.points) // MEASURED)], pose.T_part_scan)
+    needed, _ = raise_tolerance(state.tolerance, signed_distance(points, state.part)[0], state.part, state.noise)
+    if needed < FAR_MORE * state.tolerance:
+        return pose
+    with suppress(StageError):
+        raised = state.with_named("tolerance", needed, state.key("tolerance") + " raised")
+        pose = engine.call(Align, raised).get(Align.gives)
+    return pose
 
 
 def check_noise(engine: Engine, state: JobState) -> None:

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Deviation, Floats, Part, Pose, Scan, Solid
+from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Part, Pose, Scan, Solid
 from damageest.checks.budget import UNKNOWN
 from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, to_solid, unite
 from damageest.geometry.transforms import move_points
+from damageest.output.result_json import to_dict
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
@@ -33,7 +34,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
     if state.failures and not state.found:
         raise state.failures[0]
     part, scan, deviation = state.part, state.scan, state.deviation
-    sites = tuple(_describe_site(site, part, deviation) for site in state.found)
+    sites = tuple(_describe_site(site, part, state.aligned) for site in state.found)
     label = np.zeros(len(scan.points), np.int32)
     for site in sites:
         label[site.points] = site.id
@@ -76,13 +77,13 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         budget=state.budget,
         not_in_budget=tuple(UNKNOWN[name] for name in state.scanner_errors.unknown),
         certificate=state.scanner_errors.certificate,
-        conversions=state.conversions,
+        conversions={"dict": to_dict, **state.conversions},
         sections=state.sections,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
 
 
-def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
+def _describe_site(found: FoundSite, part: Part, aligned: Scan) -> Site:
     evidence, members = found.evidence, found.members
     warnings = make_notes("enclose", found.notes)
     deposit, damage, enclosures = found.deposit, found.damage, found.enclosures
@@ -110,7 +111,7 @@ def _describe_site(found: FoundSite, part: Part, deviation: Deviation) -> Site:
         path=path,
         method=found.method,
         evidence=evidence,
-        max_depth=found.measure_depth(deviation),
+        max_depth=found.measure_depth(part, aligned),
         warnings=warnings,
     )
 

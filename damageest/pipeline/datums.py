@@ -56,12 +56,12 @@ def note_datums(adapted: AdaptedPart | None, aligner: Align | None, part: Part, 
 
 def has_datums(aligner: Align | None) -> bool:
     """Whether the job names datums."""
-    return bool(getattr(aligner, "datum", ()))
+    return aligner is not None and bool(aligner.datums)
 
 
 def choose_on_datums(aligner: Align | None, part: Part, places: Floats, face: Ints) -> Flags | None:
     """Which places (N,3) on the triangles ``face`` (N,) of the part lie on the job's datums; None without datums."""
-    datum: Any = getattr(aligner, "datum", ())
+    datum: Any = () if aligner is None else aligner.datums
     if not datum:
         return None
     groups: list[Any] = [getattr(one, "skin", one) for one in datum.values()] if isinstance(datum, dict) else [datum]

@@ -10,9 +10,11 @@ import numpy as np
 
 from damageest.artefacts import Deposit, Floats, Solid
 from damageest.errors import StageError
-from damageest.geometry.solids import concatenate_meshes, to_manifold, to_solid, unite
+from damageest.geometry.bubbles import find_bubbles
+from damageest.geometry.solids import concatenate_meshes, subtract_lost, to_manifold, to_solid, unite
 from damageest.geometry.touching import separate_sheets
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.pores import PORE
 from damageest.pipeline.state import Failures, FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.stages.allowance import Allowance
@@ -21,7 +23,7 @@ SPECK, TOLD = 1e-9, 1e-5
 """Shares of a deposit's volume: below the first, an overlap is rounding; below the second, not reported."""
 
 
-@step(gives=("found", "failures"), reads=("found",), calls=(Allowance,))
+@step(gives=("found", "failures"), reads=("found", "part"), calls=(Allowance,))
 def make_deposits(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures]:
     """Makes the deposit of each accepted site. A site that the stage refuses keeps its damage volume; what to deposit
     is not known."""
@@ -29,18 +31,41 @@ def make_deposits(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...
     done: list[FoundSite] = []
     failures: list[StageError] = []
     for site in state.found:
-        if not site.accepted:
-            done.append(site.with_value(FoundSite.deposit, None))
+        if not site.accepted or site.method == PORE:
+            done.append(replace(site.with_value(FoundSite.deposit, None), refused=site.method == PORE))
             continue
         rest = [other for other in state.found if other is not site and other.accepted]
         others = _unite([other.damage for other in rest]) if told else None
         site = replace(site.with_value(FoundSite.others, others), job=state)
         try:
-            done.append(engine.call(Allowance, site))
+            made = engine.call(Allowance, site)
+            refuse_bubbles(made.deposit, made.damage, state.part)
+            done.append(made)
         except StageError as error:
             failures.append(error)
             done.append(replace(site.with_value(FoundSite.deposit, None), refused=True))
     return tuple(done), failures
+
+
+def refuse_bubbles(deposit: Solid | None, damage: Solid, part: Solid) -> None:
+    """Raises StageError where a deposit encloses an empty space, which no deposition leaves."""
+    if deposit is None:
+        return
+    origin = part.bounds.mean(axis=0)
+    cavity = deposit.cavity if isinstance(deposit, Deposit) else None
+    bubbles = find_bubbles(deposit, lambda: _take_left(part, cavity or damage, origin), part, origin)
+    if bubbles:
+        largest = max(bubbles, key=lambda each: float(each.volume()))
+        box = np.reshape(largest.bounding_box(), (2, 3)).mean(axis=0) + origin
+        place = ", ".join(f"{value:.4g}" for value in box)
+        raise StageError(
+            f"allowance: the deposit encloses an empty space of {largest.volume():.3g} in volume, near ({place})",
+            "another outer or overlap, or a keep_out that reaches out of the deposit",
+        )
+
+
+def _take_left(part: Solid, lost: Solid, origin: Floats) -> Any:
+    return subtract_lost(to_manifold(part, origin), to_manifold(lost, origin))
 
 
 @step(gives="found")

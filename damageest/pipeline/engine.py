@@ -7,14 +7,14 @@ import typing
 import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from typing import Any, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from damageest.artefacts import ArtefactError
 from damageest.errors import StageError, clean_message, describe_shortage, is_interrupt
-from damageest.isolation import Limits, at_work
+from damageest.isolation import Limits, at_work, listen
 from damageest.isolation.lost_threads import raise_lost
 from damageest.job.model import Job
-from damageest.pipeline.cache import Cache, digest
+from damageest.pipeline.cache import digest
 from damageest.pipeline.calls import call_guarded, run_stage
 from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Candidate, FoundSite, JobState
@@ -43,21 +43,31 @@ S = TypeVar("S", JobState, Candidate, FoundSite)
 T = TypeVar("T")
 
 
+class Store(Protocol):
+    """Where the values of stages are kept from run to run: in files, or in memory."""
+
+    def get(self, name: str, key: str) -> tuple[bool, Any]: ...
+
+    def put(self, name: str, key: str, value: Any) -> None: ...
+
+
 @dataclass
 class Engine:
     """One run of a job. ``records`` of stages and ``steps`` grow as it goes; ``stems`` are the cache entries that it
     used. ``silent``: it calls stages on values that are not the job's own, and observers do not get these calls.
-    ``limits``: of each stage, of memory for those that run in a process of their own."""
+    ``limits``: of each stage, of memory for those that run in a process of their own. ``last``: the state after the
+    last item of the route that came to its end."""
 
     job: Job
     registry: Registry
-    cache: Cache | None = None
+    cache: Store | None = None
     records: list[StageRecord] = field(default_factory=list)
     steps: list[StepRecord] = field(default_factory=list)
     stems: list[str] = field(default_factory=list)
     memo: dict[str, Any] = field(default_factory=dict)
     silent: bool = False
     limits: Limits = field(default_factory=Limits)
+    last: JobState | None = None
 
     def make_silent(self, *contracts: Contract) -> Engine:
         """An engine for calls of stages on other values than the job's own: with the same cache, without records.
@@ -85,16 +95,17 @@ class Engine:
         tell(hooks.damageest_before_stage, **named)
         start = time.perf_counter()
         try:
-            cached, value = self.remember(
-                contract.stage + (f"-{state.number}" if state.number else ""),
-                key,
-                lambda: _check_value(
-                    run_stage(stage, item, {name: state.get(name) for name in needs}, self.limits, state.number),
-                    contract,
-                    state,
-                ),
-                keep=contract.stage not in ("export", "report"),
-            )
+            with listen(lambda what: tell(hooks.damageest_part_begins, **named, what=what)):
+                cached, value = self.remember(
+                    contract.stage + (f"-{state.number}" if state.number else ""),
+                    key,
+                    lambda: _check_value(
+                        run_stage(stage, item, {name: state.get(name) for name in needs}, self.limits, state.number),
+                        contract,
+                        state,
+                    ),
+                    keep=contract.stage not in ("export", "report"),
+                )
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
@@ -206,6 +217,8 @@ def follow(route: Route, engine: Engine, state: JobState) -> JobState:
             state = call_each(engine, item, state)
         else:
             state = engine.call(item, state)
+        if not engine.silent:
+            engine.last = state
     return state
 
 

@@ -39,7 +39,7 @@ def correct_views(
     fits views: noise, spacing and a tolerance `auto` are then measured again, and that little of the scan lay on the
     part is no doubt any more."""
     label, found_by = separate_views(part, aligned, tolerance) or (None, "given")
-    views = fit_views(part, aligned, tolerance, getattr(aligner, "fit_views", False), label, found_by)
+    views = fit_views(part, aligned, tolerance, aligner is not None and aligner.moves_views, label, found_by)
     if label is not None:
         if views is None or not views.disagree:
             return None, pose, aligned, noise, spacing, tolerance, warnings
@@ -61,7 +61,7 @@ def correct_scale(
     part: Part, scan: Scan, pose: Pose, aligned: Scan, tolerance: float, unit: str, reader: ReadScan | None
 ) -> tuple[Scan, Pose, Scan, float]:
     """Corrects the scan's scale where it is wrong and the job says so, and gives the scale that was taken out."""
-    if getattr(reader, "scale", None) != "auto":
+    if reader is None or not reader.finds_scale:
         return scan, pose, aligned, 1.0
     points = aligned.points[:: max(1, len(aligned.points) // MEASURED)]
     distance, _ = signed_distance(points, part)

@@ -6,6 +6,8 @@ import math
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Pose, Reason, Scan, Sites
 from damageest.checks.scan_quality import (
     check_walls,
@@ -20,8 +22,9 @@ from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.far_points import find_far
+from damageest.geometry.filled import find_filled
 from damageest.geometry.noise import measure_noise_and_spacing
-from damageest.geometry.units import diagnose_scale, diagnose_size
+from damageest.geometry.units import diagnose_scale, diagnose_size, question_size
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache
 from damageest.pipeline.engine import Engine, follow, start
@@ -37,6 +40,29 @@ from damageest.stages.segment import Segment
 
 COMPARED = 20_000
 """Points that the tolerance is chosen from after the alignment."""
+
+
+@step(gives="scan")
+def choose_columns(scan: Scan, part: Part, reader: ReadScan | None, unit: str) -> Scan:
+    """Where the scan is not of the part's size, and its files may be meant otherwise: the one way that is, with a
+    warning. Raises InputError where several are."""
+    if reader is None or not scan.columns or not diagnose_scale(scan.points, part.vertices, part.unit):
+        return scan
+    others = list(reader.read_otherwise(unit))
+    fits = [one for one in others if not diagnose_scale(one.points, part.vertices, part.unit)]
+    if len(fits) > 1:
+        ways = ", or ".join(f"columns: '{one.columns[0]}'" for one in fits)
+        raise InputError(
+            f"scan: {'; '.join(scan.columns)}, but their size is not the part's; with others it is: give {ways}"
+        )
+    if not fits:
+        return scan
+    text = (
+        f"{'; '.join(scan.columns)}, but their size is not the part's: the scan was read as "
+        f"columns: '{fits[0].columns[0]}', which is of its size"
+    )
+    remedy = "give scan.columns to say what they are"
+    return replace(fits[0], warnings=(*fits[0].warnings, Reason("columns", text, remedy=remedy)))
 
 
 @step(gives="warnings")
@@ -73,8 +99,16 @@ def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
 def measure_scan(scan: Scan, part: Part) -> tuple[float, float, float]:
     """Measures noise and spacing of the scan, and the step of its depth. Raises InputError for one of another size."""
     if wrong_size := diagnose_scale(scan.points, part.vertices, part.unit):
-        raise InputError(f"scan: {wrong_size}", topic="unit")
+        raise InputError(f"scan: {wrong_size}{say_columns(scan)}", topic="unit")
     return (scan.noise, scan.spacing, 0.0) if scan.noise else _measure(scan)
+
+
+def say_columns(scan: Scan) -> str:
+    """The end of a message about a scan that does not fit the part: what was taken for x, y and z; empty where a file
+    leaves no choice."""
+    if not scan.columns:
+        return ""
+    return f"; {'; '.join(scan.columns)}: if they are others, give scan.columns"
 
 
 @step(gives=("scan", "tolerance", "warnings"))
@@ -88,6 +122,24 @@ def take_tolerance(
     if wrong_unit := diagnose_size(part.vertices, part.unit):
         warnings = [Reason("unit", wrong_unit), *warnings]
     return scan, tolerance, warnings
+
+
+@step(gives=("scan", "warnings"))
+def set_filled_aside(scan: Scan) -> tuple[Scan, Reasons]:
+    """Removes points that software put where the scanner saw nothing, and says how many."""
+    filled = find_filled(scan.points, scan.noise)
+    if not filled.any():
+        return scan, ()
+    x, y, z = np.median(scan.points[filled], axis=0)
+    text = (
+        f"{int(filled.sum()):,} scan points ({filled.mean():.1%}) were set aside: they lie on a sheet near ({x:.4g}, "
+        f"{y:.4g}, {z:.4g}) of the scan's frame that has less than a tenth of the noise elsewhere, as software makes "
+        "it to close what the scanner did not see"
+    )
+    remedy = "export the scan without filling holes and without closing it (not watertight)"
+    scan = scan.take(~filled)
+    reason = Reason("filled_points", text, amount=int(filled.sum()), remedy=remedy)
+    return replace(scan, notes=(*scan.notes, text)), [reason]
 
 
 def _measure(scan: Scan) -> tuple[float, float, float]:
@@ -120,6 +172,8 @@ def settle_tolerance(
     if asked_tolerance is None and len(points):
         distance = signed_distance(points[:: max(1, math.ceil(len(points) / COMPARED))], part)[0]
         tolerance, warnings = raise_tolerance(tolerance, distance, part, noise)
+    if diagnose_size(part.vertices, part.unit) is None and (tiny := question_size(tolerance, part.vertices, part.unit)):
+        warnings = [*warnings, Reason("unit", tiny)]
     return tolerance, [*warnings, *check_walls(tolerance, part)]
 
 
@@ -155,7 +209,7 @@ def read_part(job: Job, registry: Registry) -> Part:
 def read_inputs(job: Job, registry: Registry, memo: dict[str, Any] | None = None) -> tuple[Part, Scan]:
     """The part and the scan of a job, as their stages read them; ``memo`` takes them by the keys of what was read."""
     engine = Engine(job, registry, memo={} if memo is None else memo)
-    state = follow((ReadPart, ReadScan, crop_scan, set_far_aside), engine, start(engine))
+    state = follow((ReadPart, ReadScan, choose_columns, crop_scan, set_far_aside), engine, start(engine))
     return state.part, state.scan
 
 

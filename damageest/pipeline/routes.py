@@ -21,9 +21,11 @@ from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.large_scans import add_points_near_damage, where_thinned
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
+from damageest.pipeline.pores import add_pores
 from damageest.pipeline.prepare import (
     check_clusters,
     check_intact,
+    choose_columns,
     crop_scan,
     gather_intact,
     measure_scan,
@@ -31,6 +33,7 @@ from damageest.pipeline.prepare import (
     note_scan,
     place_scan,
     set_far_aside,
+    set_filled_aside,
     settle_tolerance,
     take_tolerance,
 )
@@ -76,17 +79,20 @@ ACQUIRE: Route = (
     ReadPart,  # unit, tolerance -> part
     check_selections,  # part ->
     ReadScan,  # unit, part -> scan
+    choose_columns,  # scan, part, reader, unit -> scan
     note_scan,  # scan -> +warnings
     crop_scan,  # scan, reader -> scan
     set_far_aside,  # scan, part -> scan, +warnings
     correct_temperature,  # scan, temperature -> scan, thermal_scale
     measure_scan,  # scan, part -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
+    set_filled_aside,  # scan -> scan, +warnings
     where_taken(  # samples
         Sample,  # part, tolerance -> samples
         by=(Align, Segment, EncloseAll),
     ),
-    align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, part, scan, samples -> pose, refusal
+    align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, spacing, part, scan, samples
+    #     -> pose, refusal
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader
@@ -143,6 +149,8 @@ AT_ONCE: Route = (
 )
 CLOSE: Route = (
     add_lost_bodies,  # part, skin, found -> found
+    add_pores,  # calls Reconstruct: found, failures, sites, aligned, deviation, part, tolerance, unit, spacing, noise
+    #     -> found, failures
     set_specks_aside,  # failures, sites, aligned, deviation, unit -> failures, +warnings
     number_sites,  # found -> found
     choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
@@ -155,18 +163,18 @@ CLOSE: Route = (
     weigh_scanner,  # scanner, temperature, corrected_scale, fitted, aligned, pose_error, facts, part, unit
     #     -> scanner_errors, +warnings
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
-    #     scanner_errors, tolerance, unit -> found
+    #     scanner_errors, tolerance, unit, adapter, warnings -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
     #     views -> found
     fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, deviation, tolerance, asked_tolerance,
-    #     unit -> found, folded, +warnings
+    #     unit, part -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, part, adapted, deviation, skin, unit, tolerance, explained,
     #     warnings -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
     sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded,
-    #     views -> volume_95
+    #     views, sensor -> volume_95
     sum_budget,  # found, volume_95, scanner_errors, aligned, part, unit, adapted, folded, views -> budget
     cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
     note_unused,  # samples -> +warnings

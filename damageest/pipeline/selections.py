@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from damageest.artefacts import Part
 from damageest.errors import Fault, JobError, StageError
+from damageest.geometry.near_faces import name_nearest_skin
 from damageest.job.model import Job
 from damageest.pipeline.engine import Engine, follow, start
 from damageest.pipeline.steps import step
@@ -14,7 +15,7 @@ from damageest.stages.part import ReadPart
 @step()
 def check_selections(engine: Engine, part: Part) -> None:
     """Raises JobError where a selector of a stage names a CAD face that the part does not have, or selects no skin of
-    the part."""
+    the part, and where a region to keep free is out of reach of any deposit."""
     if any(stage.find_selectors() for stage in engine.job.stages.values()):
         faults = find_wrong_selections(engine.job, part)
         if faults:
@@ -37,6 +38,8 @@ def find_wrong_selections(job: Job, part: Part) -> list[Fault]:
     for contract, stage in job.stages.items():
         for place, selector in stage.find_selectors():
             if not selector.chooses_skin():
+                if text := stage.find_idle_region(selector, part):
+                    faults.append(job.make_fault(text, contract.stage, *place))
                 continue
             try:
                 found = selector.finds_skin(part)
@@ -45,7 +48,8 @@ def find_wrong_selections(job: Job, part: Part) -> list[Fault]:
                 continue
             if not found:
                 text = (
-                    f"no skin of the part is selected by {' and '.join(selector.conditions())}; "
+                    f"no skin of the part is selected by {' and '.join(selector.conditions())}: "
+                    f"{name_nearest_skin(selector, part)}; "
                     "correct the conditions (lengths in the job's unit, places in part coordinates), or remove it"
                 )
                 faults.append(job.make_fault(text, contract.stage, *place))

@@ -102,7 +102,7 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
     gives=("found", "folded", "warnings"),
     reads=(
         "found", "sensor", "explained", "sheets", "aligner", "accept", "aligned", "deviation", "tolerance",
-        "asked_tolerance", "unit",
+        "asked_tolerance", "unit", "part",
     ),
 )  # fmt: skip
 def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
@@ -114,7 +114,7 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
         return state.found, 0.0, ()
     gone = [site for site in state.found if site.number in causes]
     volume = state.explained.volume + sum(_limit_explained(state, site, causes[site.number]) for site in gone)
-    deepest = max([state.explained.deepest, *(site.measure_depth(state.deviation) for site in gone)])
+    deepest = max([state.explained.deepest, *(site.measure_depth(state.part, state.aligned) for site in gone)])
     all_causes = {*causes.values(), *(("views",) if state.explained.places else ())}
     told = [_describe_cause(state, cause) for cause in CAUSES if cause in all_causes]
     many, unit = f"{count} places are" if count > 1 else "1 place is", state.unit
@@ -142,7 +142,7 @@ def _limit_explained(state: JobState, site: FoundSite, cause: str) -> float:
 
 def is_given(aligner: Align | None) -> bool:
     """Whether the job gives the pose, so that no error of the scan moves it."""
-    return getattr(aligner, "use", "none") == "none"
+    return aligner is None or not aligner.gives_fitted_pose
 
 
 def _is_folding(aligner: Align | None, accept: Accept) -> bool:
@@ -164,8 +164,10 @@ def _choose_limit(state: JobState) -> float:
 
 def _explain(state: JobState, site: FoundSite) -> str:
     """What explains a doubtful site that is no loss, one of `CAUSES`; empty where it may be one."""
-    depth = site.measure_depth(state.deviation)
-    if not _is_folding(state.aligner, state.accept) or site.verdict.level != "doubtful" or not depth:
+    if not _is_folding(state.aligner, state.accept) or site.verdict.level != "doubtful":
+        return ""
+    depth = site.measure_depth(state.part, state.aligned)
+    if not depth:
         return ""
     against = {reason.code for reason in site.verdict.reasons if reason.effect == "contradicts"}
     if "few_points" in against and against & UNSUPPORTED:

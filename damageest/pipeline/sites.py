@@ -35,7 +35,7 @@ def take_clusters(
     aligned: Scan, sites: Sites, encloser: Enclose | None, wanted: tuple[int, ...] | None
 ) -> tuple[Candidate, ...]:
     """Makes a candidate of each cluster of damaged points, or of each that is still wanted."""
-    fine = not getattr(encloser, "refines", False)
+    fine = encloser is None or not encloser.refines
     candidates = []
     for number in range(1, sites.count + 1) if wanted is None else wanted:
         candidate = Candidate(number=number, clusters=(number,), method="surface")

@@ -45,6 +45,7 @@ from damageest.checks.two_sheets import Sheets
 from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
+from damageest.geometry.lost_depth import measure_lost_depth
 from damageest.job.model import Accept, SiteChoice
 from damageest.job.scanner import ScannerInfo, Temperature
 from damageest.job.sections import SectionChoice
@@ -158,9 +159,9 @@ class Candidate(_SiteState):
 class FoundSite(_SiteState):
     """A site with its damage volume. ``members`` (M,): its scan points; ``refused``: `allowance` gave no deposit;
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
-    ``displaced``, ``covered``: as in `SiteFacts`; ``uncertainty``: of the volume of ``damage``, and ``error``: the same
-    in a form that adds up over the sites; ``beyond``: how ``damage`` lies against its points; ``dependences``: on the
-    free motions of the pose; ``enclosures``: as in `Site`."""
+    ``displaced``, ``twins``, ``bent_wall``, ``covered``: as in `SiteFacts`; ``uncertainty``: of the volume of
+    ``damage``, and ``error``: the same in a form that adds up over sites; ``beyond``: how it lies against its points;
+    ``dependences``: on the free motions of the pose; ``enclosures``: as in `Site`."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -171,6 +172,8 @@ class FoundSite(_SiteState):
     verdict: Verdict = field(default_factory=Verdict)
     accepted: bool = True
     displaced: tuple[int, ...] = ()
+    twins: tuple[int, ...] = ()
+    bent_wall: float = 0.0
     covered: tuple[tuple[int, float], ...] = ()
     uncertainty: Uncertainty | None = None
     error: SiteError | None = None
@@ -186,9 +189,9 @@ class FoundSite(_SiteState):
     built = Value[Solid | None]()
     path = Value[DepositPath | None]()
 
-    def measure_depth(self, deviation: Deviation) -> float:
-        """The largest depth of its scan points below the skin; 0 without any."""
-        return max(float(-deviation.distance[self.members].min(initial=0.0)), 0.0)
+    def measure_depth(self, part: Part, aligned: Scan) -> float:
+        """The largest depth of its scan points below the lost skin; 0 without any."""
+        return measure_lost_depth(self.damage, part, aligned.points[self.members])
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from damageest.checks.surplus import close_surplus, compare_with_losses, describ
 from damageest.checks.two_sheets import FARTHEST
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
+from damageest.geometry.alike import have_same_shape
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
 from damageest.geometry.solids import to_manifold, to_solid
@@ -81,6 +82,8 @@ def relate_surplus(
         if item.kind == "surroundings":
             continue
         touching = {site.number for site in beside if _is_touching(aligned.points, item, site, reach)}
+        twins = {site.number for site in sites if site not in beside and _is_twin(item, site)}
+        sites = [replace(s, twins=(*s.twins, item.id)) if s.number in twins else s for s in sites]
         covered = (item.id, item.area)
         sites = [replace(s, covered=(*s.covered, covered)) if s.number in touching else s for s in sites]
         if item.kind == "displaced piece":
@@ -117,6 +120,11 @@ def relate_surplus(
 def _is_equal(item: Surplus, volumes: tuple[float, ...], most: float) -> bool:
     """Whether the volume of a surplus is one of the given volumes, within a factor ``most``."""
     return item.volume is not None and any(1 / most < volume / item.volume < most for volume in volumes)
+
+
+def _is_twin(item: Surplus, site: FoundSite) -> bool:
+    """Whether a surplus has the shape of a loss that lies elsewhere."""
+    return item.solid is not None and have_same_shape(item.solid, site.damage)
 
 
 def _is_touching(points: Floats, item: Surplus, site: FoundSite, reach: float) -> bool:

@@ -12,25 +12,32 @@ from damageest.artefacts import INTACT, AdaptedPart, Deviation, Flags, Ints, Par
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.budget import make_depth_budget, make_volume_budget
 from damageest.checks.coverage import find_removed_cells
+from damageest.checks.dent import find_bent_wall
 from damageest.checks.fading import measure_fading
 from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
+from damageest.checks.inner_surface import measure_inner_surface
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import describe_few
 from damageest.checks.scanner import ScannerErrors
-from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, sum_free
+from damageest.checks.shallow_loss import limit_shallow_loss
+from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, measure_certain, sum_free
 from damageest.checks.uncertainty import limit_beside, measure_shifts, measure_site_error
 from damageest.checks.view_fit import ViewFits
 from damageest.checks.view_overlap import compare_at_site
-from damageest.findings import Budget, Fading, Interval, Uncertainty
+from damageest.findings import Budget, Fading, Interval, Sensor, Uncertainty
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
+from damageest.pipeline.pores import PORE
 from damageest.pipeline.state import Failures, FoundSite, JobState
 from damageest.pipeline.steps import step
+from damageest.stages.adapt import Adapt
 from damageest.stages.allowance import Allowance
 
 COARSE = 0.05
 """Point spacing, in diagonals of the part, from which a loss between the points can be of any size."""
+ROUGH = 0.1
+"""Standard deviation of where the closed surface of a pore lies, in gaps between its points."""
 BESIDE = 2.0
 """Distance from a damage volume, in reaches, within which unseen skin may be part of the same loss."""
 
@@ -52,6 +59,8 @@ BESIDE = 2.0
         "scanner_errors",
         "tolerance",
         "unit",
+        "adapter",
+        "warnings",
     ),
 )
 def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
@@ -59,25 +68,30 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     if not state.found:
         return state.found
     taken = _TakenSkin(state, state.found)
-    return tuple(_measure_site(state, site, taken, state.pose_error) for site in state.found)
+    pose = state.pose_error.leave_out(state.pose.free, state.part.diagonal / 4)
+    return tuple(_measure_site(state, site, taken, pose) for site in state.found)
 
 
 @step(gives="volume_95")
 def sum_uncertainty(
     found: tuple[FoundSite, ...], failures: Failures, part: Part, pose: Pose, aligned: Scan, deviation: Deviation,
-    tolerance: float, adapted: AdaptedPart | None, folded: float, views: ViewFits | None,
+    tolerance: float, adapted: AdaptedPart | None, folded: float, views: ViewFits | None, sensor: Sensor,
 ) -> Interval | None:  # fmt: skip
     """Gives the job the 95 % interval of its total volume.
 
     There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
     make its high end larger: they may be damage, too, as may what an adapted part's field took for form, and what was
     taken for a misplaced view. Where no site
-    was found in a scan that could not show one, or in a pose that is doubted, it is not known either.
+    was found, its high end is what may lie below the tolerance and between the points; in a scan that could not show a
+    site, or in a pose that is doubted, it is not known either.
     """
     hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
     if not found:
         is_unknown = failures or pose.doubts or _may_hide_loss(part, aligned, deviation, tolerance)
-        return None if is_unknown else (0.0, measure_hidden_wear(part, pose) + hidden)
+        if is_unknown:
+            return None
+        shallow = limit_shallow_loss(part, aligned, deviation, tolerance, sensor.least_width)
+        return 0.0, measure_hidden_wear(part, pose) + hidden + shallow
     lost = [error for error in failures if error.stage != Allowance.stage]
     taken = [site for site in found if site.accepted]
     errors = [site.error for site in taken if site.error is not None]
@@ -123,6 +137,8 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         known = site.damage.volume
         error = SiteError(known, 0.0, 0.0, 0.0, 0.0)
         return replace(site, uncertainty=Uncertainty((known, known), None), error=error)
+    if site.method == PORE:
+        return _measure_pore(state, site)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
     beyond = ask_beyond_points(
@@ -130,13 +146,13 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         state.tolerance, state.unit,
     )  # fmt: skip
     site = replace(site, beyond=beyond)
-    differ = WIDTH * compare_at_site(state.aligned, state.deviation, site.members, state.skin.cells.edge)
+    differ = WIDTH * compare_at_site(state.part, state.aligned, state.deviation, site.members, state.skin.cells.edge)
     facts = replace(state.facts, between_views=max(state.facts.between_views, differ))
     # what the model fit gives is the 95 % bound of a deviation
     found = measure_site_error(
         site.damage, inner, state.part, state.aligned, points, site.evidence, pose, facts, beyond,
         free=state.pose.free, adapted=state.adapted, scanner=state.scanner_errors,
-        form=measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH,
+        form=_measure_form(state, site),
     )  # fmt: skip
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
@@ -144,8 +160,10 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     fading = _measure_fading(state, site, inner, taken, pose)
     dependences = measure_dependence(site.damage, state.part, state.pose)
     extrapolated, extrapolated_error = _measure_extrapolated(state, site.damage, inner)
+    bent_wall = find_bent_wall(site.damage, state.part, state.skin, state.aligned, state.deviation, site.members)
     error = replace(
         found,
+        less=found.less + (site.damage.volume if bent_wall else 0.0),
         beside=limit_beside(state.coverage, site.damage, reach, found.depth),
         fading=fading.beyond if fading else 0.0,
         rates=np.append(found.rates, [one.rate for one in dependences]),
@@ -177,8 +195,40 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
             free=error.free,
         ),
         depth_budget=make_depth_budget(error, state.scanner_errors, state.unit),
+        certain=measure_certain(error),
     )  # fmt: skip
-    return replace(site, uncertainty=uncertainty, error=error, dependences=dependences)
+    return replace(site, uncertainty=uncertainty, error=error, dependences=dependences, bent_wall=bent_wall)
+
+
+def _measure_pore(state: JobState, site: FoundSite) -> FoundSite:
+    """A pore with its uncertainty: no rim and no skin are near, so that noise and the gaps between the points count."""
+    points, noise = state.aligned.points[site.members], state.aligned.noise
+    all_inner = np.ones(len(site.damage.faces), bool)
+    surface = measure_inner_surface(site.damage, all_inner, points, noise, state.aligned.spacing, state.tolerance)
+    if surface is None:
+        return replace(site, uncertainty=Uncertainty(None, None))
+    deepest = float(-state.deviation.distance[site.members].min())
+    error = SiteError(
+        site.damage.volume, surface.noise, ROUGH * surface.gap * site.damage.area, 0.0, 0.0,
+        depth=deepest, depth_error=float(np.hypot(surface.gap / 2, noise)), depth_by={"spacing": surface.gap / 2},
+    )  # fmt: skip
+    volume, depth = combine_site(error)
+    unit = state.unit
+    uncertainty = Uncertainty(
+        volume, depth, noise=error.noise, spacing=error.spacing,
+        budget=make_volume_budget([error], state.scanner_errors, noise, state.part.tessellation_error, unit),
+        depth_budget=make_depth_budget(error, state.scanner_errors, unit),
+    )  # fmt: skip
+    return replace(site, uncertainty=uncertainty, error=error)
+
+
+def _measure_form(state: JobState, site: FoundSite) -> float:
+    """The standard deviation by which a form that fits the skin moves that of a site; 0 where stage `adapt` was asked
+    for that form and did not take it: the patches of the skin tell what it leaves."""
+    was_asked = state.adapter is not None and state.adapter.deforms and state.adapted is None
+    if was_asked and not any(note.code == Adapt.stage for note in state.warnings):
+        return 0.0
+    return measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH
 
 
 def _may_hide_loss(part: Part, scan: Scan, deviation: Deviation, tolerance: float) -> bool:
@@ -201,7 +251,7 @@ def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> tuple
     places, normals = damage.triangles[~inner].mean(axis=1), damage.face_normals[~inner]
     far = float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
     moved = measure_shifts(adapted.part, adapted.modes, places, normals)
-    return far, float(np.sqrt((moved**2).sum(axis=0)).max(initial=0.0))
+    return far, float(np.hypot(np.sqrt((moved**2).sum(axis=0)).max(initial=0.0), adapted.unfollowed))
 
 
 def _measure_fading(

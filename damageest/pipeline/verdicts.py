@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import AdaptedPart, Deviation, Part, Pose, Reason, Scan
 from damageest.checks.coverage import SkinView, find_removed_cells
+from damageest.checks.elsewhere import measure_elsewhere
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
 from damageest.checks.model_fit import FittedModel
@@ -17,6 +18,7 @@ from damageest.checks.scan_facts import gather_scan_facts
 from damageest.checks.two_sheets import Sheets, measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
 from damageest.checks.verdict import ask_rules, decide, open_end
+from damageest.checks.visibility import measure_visibility
 from damageest.errors import StageError
 from damageest.findings import Level, Surplus
 from damageest.geometry.solids import to_solid, unite
@@ -26,7 +28,7 @@ from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import FreePose, ScanFacts, SiteFacts
-from damageest.rules.scattered import SHALLOW
+from damageest.rules.scattered import ALIKE, SHALLOW
 from damageest.stages.align import Align
 
 BY_RAYS = 0.5
@@ -71,7 +73,7 @@ def gather_facts(
     """Measures what the whole scan says about skin that deviates and is not damaged."""
     return gather_scan_facts(
         skin, part, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
-        is_fitted=getattr(aligner, "use", "none") != "none" and not pose.is_held, sheets=sheets,
+        is_fitted=aligner is not None and aligner.gives_fitted_pose and not pose.is_held, sheets=sheets,
         adapted=0.0 if adapted is None else adapted.amount,
     )  # fmt: skip
 
@@ -86,7 +88,7 @@ def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
     for site, facts in zip(state.found, _gather_all_facts(state), strict=True):
         reasons = ask_rules(state.rules, facts, state.facts)
         interval = open_end(facts.interval, reasons)
-        verdict = decide(facts.volume, interval, reasons)
+        verdict = decide(facts.volume, interval, reasons, facts.uncertainty.certain if facts.uncertainty else 0.0)
         uncertainty = replace(site.uncertainty, volume_95=interval) if site.uncertainty else None
         done.append(
             replace(
@@ -109,13 +111,17 @@ def _gather_all_facts(state: JobState) -> list[SiteFacts]:
     """The facts of each site, with what the others say about it."""
     each = [_gather_site_facts(state, site) for site in state.found]
     shifted = max((one.typical for one in each if one.one_motion), default=0.0)
-    shallow = sum(one.deepest < SHALLOW * state.tolerance for one in each if one.count)
-    return [replace(one, shifted=shifted, shallow=shallow) for one in each]
+    waves = [one.volume for one in each if one.count and one.deepest < SHALLOW * state.tolerance]
+    return [replace(one, shifted=shifted, shallow=sum(v >= ALIKE * one.volume for v in waves)) for one in each]
 
 
 def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
+    # from the nearest skin, whichever: what moved by an error of pose or views is moved from there
     depth, points = -state.deviation.distance[site.members], state.aligned.points
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
+    visible = measure_visibility(
+        site.damage, state.part, state.aligned, state.deviation, points[site.members], state.tolerance
+    )
     return SiteFacts(
         volume=site.damage.volume,
         area=measure_area(points[site.members], state.skin.cells.edge) if len(depth) else 0.0,
@@ -130,20 +136,37 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
         rim_unseen=measure_unseen_rim(
             site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
         ),
-        two_sheets=measure_two_sheets(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        two_sheets=measure_two_sheets(
+            state.aligned, state.deviation, state.part, site.members, state.tolerance, site.damage
+        ),
         misplaced=0.0
         if state.views is None
         else state.views.find_explained(state.part, state.aligned, state.deviation, site.members, state.tolerance),
         one_motion=is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        elsewhere=measure_elsewhere(
+            state.part,
+            state.aligned,
+            state.deviation,
+            site.members,
+            state.skin,
+            find_removed_cells(site.damage, state.skin),
+            state.tolerance,
+        )
+        if state.facts.is_fitted
+        else 0.0,
         other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
         free=tuple(
             FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
             for one in site.dependences
         ),
         displaced=site.displaced,
+        twins=site.twins,
+        bent_wall=site.bent_wall,
         covered=site.covered,
         beyond=site.beyond.amount,
         beyond_words=site.beyond.reason,
+        shut=visible.shut,
+        turned=visible.turned,
     )
 
 

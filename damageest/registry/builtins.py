@@ -75,6 +75,7 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.beside import Beside
     from damageest.rules.beyond_points import BeyondPointsRule
     from damageest.rules.covered import Covered
+    from damageest.rules.dent import Dent
     from damageest.rules.displaced import Displaced
     from damageest.rules.fading import FadingOut
     from damageest.rules.few_points import FewPoints
@@ -83,19 +84,22 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.intact_inside import IntactInside
     from damageest.rules.intact_over import IntactOver
     from damageest.rules.misplaced_view import MisplacedView
+    from damageest.rules.not_visible import NotVisible
     from damageest.rules.nothing import Nothing
     from damageest.rules.off_boundary import OffBoundary
     from damageest.rules.one_motion import OneMotion
+    from damageest.rules.pieces import Pieces
     from damageest.rules.pose import PoseDoubt
+    from damageest.rules.revision import Revision
     from damageest.rules.scattered import Scattered
     from damageest.rules.terms import Terms
     from damageest.rules.two_sheets import TwoSheets
     from damageest.rules.wide_loss import WideLoss
 
     return [
-        Nothing, PoseDoubt, AdaptedSkin, Displaced, TwoSheets, MisplacedView, OneMotion, Scattered, OffBoundary,
-        IntactInside, IntactOver, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered, FreePoseRule, FewPoints,
-        FadingOut, Terms,
+        Nothing, Pieces, PoseDoubt, AdaptedSkin, Displaced, Revision, TwoSheets, MisplacedView, OneMotion, Scattered,
+        OffBoundary, IntactInside, IntactOver, NotVisible, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered,
+        FreePoseRule, FewPoints, FadingOut, Dent, Terms,
     ]  # fmt: skip
 
 

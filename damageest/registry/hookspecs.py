@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: seven that add, four that only observe.
+"""The hooks a plugin may implement: seven that add, five that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -68,6 +68,11 @@ def damageest_commands(app: typer.Typer) -> None:
 @hookspec
 def damageest_before_stage(stage: str, use: str, site: int) -> None:
     """Called before a stage runs; ``site`` counts from 1 and is 0 for a stage that runs once per job."""
+
+
+@hookspec
+def damageest_part_begins(stage: str, use: str, site: int, what: str) -> None:
+    """Called when a stage tells which part of its work begins; few do. ``what``: in words, for a person."""
 
 
 @hookspec

@@ -17,14 +17,19 @@ from pydantic import ValidationError
 from damageest.errors import InputError, PluginError, clean_message, describe_install, suggest
 from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
+from damageest.registry.guards import guard_path_writer, guard_writer
 from damageest.registry.loading import OWN, Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.result import Conversion
-from damageest.rules import Rule
+from damageest.rules import RULE_FAILED, Rule
+from damageest.rules.notes import RUN_CODES
+from damageest.rules.pose import POSE_CODES
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import PathWriter, Writer
 
 Kind = TypeVar("Kind", Writer, PathWriter)
+RESERVED = frozenset((*RUN_CODES, *POSE_CODES, *STAGES, RULE_FAILED))
+"""Codes that are those of no rule, and that damageest gives: for notes of a run, doubts of align, and stages' notes."""
 
 
 @dataclass(frozen=True)
@@ -80,7 +85,12 @@ class Registry:
                     added = _read_writers(plugin, "damageest_writers", Writer, writers)
                     added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
                     converts = _read_conversions(plugin, conversions)
-                    added_rules = _read_rules(plugin, rules)
+                    added_rules = _read_rules(plugin, rules, provider)
+                    if provider.name != OWN:
+                        added = {name: guard_writer(name, one, f"{provider}") for name, one in added.items()}
+                        added_paths = {
+                            name: guard_path_writer(name, one, f"{provider}") for name, one in added_paths.items()
+                        }
             except BaseException as error:
                 broken.append(describe_broken(error, provider))
                 continue
@@ -220,8 +230,9 @@ def _refuse(why: str, *values: object) -> NoReturn:
     raise InputError(why)
 
 
-def _read_rules(plugin: Any, known: Mapping[str, Rule]) -> dict[str, Rule]:
-    """The rules that a plugin adds, by their code. Raises PluginError for what is no rule, or has a code twice."""
+def _read_rules(plugin: Any, known: Mapping[str, Rule], provider: Provider) -> dict[str, Rule]:
+    """The rules that a plugin adds, by their code. Raises PluginError for what is no rule, or has a code twice, or one
+    that damageest gives itself."""
     found = plugin.damageest_rules() if hasattr(plugin, "damageest_rules") else []
     rules: dict[str, Rule] = {}
     for cls in found:
@@ -232,7 +243,13 @@ def _read_rules(plugin: Any, known: Mapping[str, Rule]) -> dict[str, Rule]:
             raise PluginError(f"its rule {cls.__qualname__} has no {', no '.join(missing)}")
         if cls.code in known or cls.code in rules:
             raise PluginError(f"its rule {cls.__qualname__} has the code '{cls.code}', which another rule has")
+        if provider.name != OWN and cls.code in RESERVED:
+            raise PluginError(
+                f"its rule {cls.__qualname__} has the code '{cls.code}', which damageest gives itself; choose another, "
+                f"as {provider.name.removeprefix('damageest-').replace('-', '_')}_{cls.code}"
+            )
         rules[cls.code] = cls()
+        rules[cls.code].owner = "" if provider.name == OWN else f"{provider}"
     return rules
 
 

@@ -15,6 +15,9 @@ from typing import ClassVar
 from damageest.artefacts import Evidence, Reason
 from damageest.findings import Interval, ModelFit, Uncertainty
 
+RULE_FAILED = "rule_failed"
+"""The code of the reason that is given instead of those of a rule that failed."""
+
 
 @dataclass(frozen=True)
 class FreePose:
@@ -69,11 +72,14 @@ class SiteFacts:
     share of its rim beside skin that the scan does not show. ``two_sheets``: share of its points where the scan shows
     another surface above them, on the skin; ``misplaced``: share of its points that a misplaced view explains
     which was not moved; ``one_motion``: whether one motion of them all explains it; ``shifted``: the typical depth of
-    the sites of the scan that it explains. ``shallow``: number of shallow sites.
+    the sites of the scan that it explains. ``shallow``: number of shallow sites that are not much smaller.
+    ``elsewhere``: share of its depth that a motion explains which puts no other skin outside.
     ``other_poses``: share of its skin that is not skin in another pose that fits as well.
-    ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss.
+    ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss,
+    ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that may be dented there, else 0.
     ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
-    ``beyond_words``: how it was found.
+    ``beyond_words``: how it was found. ``shut`` and ``turned``: shares of its inner surface that could be seen from
+    nowhere, and only from where the skin beside it was not seen.
     """
 
     volume: float
@@ -92,25 +98,32 @@ class SiteFacts:
     one_motion: bool = False
     shifted: float = 0.0
     shallow: int = 0
+    elsewhere: float = 0.0
     other_poses: float = 0.0
     free: tuple[FreePose, ...] = ()
     displaced: tuple[int, ...] = ()
+    twins: tuple[int, ...] = ()
+    bent_wall: float = 0.0
     covered: tuple[tuple[int, float], ...] = ()
     beyond: float = 0.0
     beyond_words: str = ""
+    shut: float = 0.0
+    turned: float = 0.0
 
 
 class Rule(ABC):
     """One rule.
 
-    ``code``: of the reasons that it gives. ``meaning``: what the reason says; ``threshold``: when it is given;
-    ``remedy``: what to do. All three are printed in the documentation.
+    ``code``: of the reasons that it gives; a rule of a plugin gives no others. ``meaning``: what the reason says;
+    ``threshold``: when it is given; ``remedy``: what to do. All three are printed in the documentation.
     """
 
     code: ClassVar[str]
     meaning: ClassVar[str]
     threshold: ClassVar[str]
     remedy: ClassVar[str] = ""
+    owner: str = ""
+    """The plugin that it is from, which the registry sets; empty for those of damageest."""
 
     @abstractmethod
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:

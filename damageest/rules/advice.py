@@ -51,7 +51,7 @@ TOPICS = (
     Topic(
         "surroundings",
         "Other things are in the scan",
-        ("surroundings", "far_points"),
+        ("surroundings", "far_points", "filled_points"),
         "Cut off the table, clamps, markers and powder that do not belong to the part, in the scanner's software or "
         "in the job. Crops are in the scan's own frame. What touches the part cannot be told from added metal: cut "
         "it off by hand. Powder on the skin makes the part larger by its thickness: spray thinly, or clean the "
@@ -93,7 +93,7 @@ TOPICS = (
     Topic(
         "unseen",
         "The scan has holes and shadows",
-        ("inner_surface", "beside"),
+        ("inner_surface", "beside", "not_visible"),
         "Open unseen.ply over the CAD model, turn the part, and scan these places, above all into the damage and "
         "beside it. Give the position of the scanner for each view: rays then tell a place that was seen through "
         "from one that was not seen. Do not fill holes in the scanner's software: a filled hole looks like metal "
@@ -142,7 +142,7 @@ TOPICS = (
     Topic(
         "surplus",
         "Metal or dirt lies on the part",
-        ("covered", "displaced", "displaced_piece", "surplus"),
+        ("covered", "displaced", "displaced_piece", "revision", "surplus"),
         "Remove the weld bead, spatter or dirt, and scan again, where it lies on a damage: what is lost under it "
         "cannot be seen. A piece that was pushed aside is no loss: put it back, or accept the site to repair it as "
         "if the piece were lost. Surplus elsewhere changes no volume.",

@@ -28,6 +28,7 @@ RUN_CODES: dict[str, RunCode] = {
     "align": RunCode("what the stage align says about the pose: symmetry, free motions, doubts", 0),
     "datum_moved": RunCode("the pose that datums gave was moved: by an adapted part, or by corrected views", 0),
     "unit": RunCode("the unit of part or scan is doubtful, by the size or by what a file says", 0),
+    "columns": RunCode("the columns of a text file were chosen by the part's size", 0),
     "thin_walls": RunCode("the tolerance is more than half the thickness of walls: no damage can be found there", 0),
     "tolerance_small": RunCode("the tolerance is so small that intact skin may be mistaken for damage", 0),
     "tolerance_raised": RunCode("tolerance: auto was raised, since intact skin deviates by more than the noise", 0),
@@ -37,9 +38,11 @@ RUN_CODES: dict[str, RunCode] = {
     "below_noise": RunCode("shallow places that errors of the scan explain are no sites", 0),
     "certificate": RunCode("the scan contradicts the scanner's certificate or the part's temperature", 1),
     "depth_steps": RunCode("the scan's depth has steps, as of a depth camera", 1),
+    "coarse_numbers": RunCode("the file has too few digits for a scan so far from the origin", 1),
     "sparse_scan": RunCode("the points lie far apart for the tolerance", 1),
     "coarse_part": RunCode("the part's triangles deviate from its CAD surface by more than half the tolerance", 1),
     "surroundings": RunCode("part of the scan does not belong to the part and was left out", 1),
+    "filled_points": RunCode("points by which software closed what the scanner did not see were set aside", 1),
     "far_points": RunCode("points far from all others were set aside", 1),
     "low_confidence": RunCode("points of a confidence below `min_confidence` were set aside", 1),
     "files_not_read": RunCode("files of a folder of patches are of no format that is read", 1),
@@ -57,6 +60,8 @@ RUN_CODES: dict[str, RunCode] = {
 """Codes of the notes of a run. Those of sites are the codes of rules, or of the stage that gave a note."""
 MOST_PRINTED = 8
 """Lines of notes that a run prints, those first that change a decision; result.json and report.html have all."""
+DECIDES = ("contradicts", "open")
+"""Effects of reasons that change what a site is taken for."""
 FOLDED = 3
 """Notes of one code from which they become one line."""
 
@@ -110,17 +115,34 @@ def join_reasons(reasons: Iterable[tuple[int, Reason]]) -> tuple[SiteReason, ...
 
 
 def list_notes(result: Result) -> list[str]:
-    """The notes on the run and on its sites, in the order in which a run prints them: each reason once, with the sites
-    that have it."""
-    notes = [str(note) for note in fold_notes(result.warnings)]
+    """The notes on the run and on its sites, in the order in which a run prints them: those first that change a
+    decision, each reason once, with the sites that have it."""
+    ranks = {code: one.rank for code, one in RUN_CODES.items()}
+    notes = [(ranks.get(note.code, 2), str(note)) for note in fold_notes(result.warnings)]
     for level in ("doubtful", "likely", "proven"):
         chosen = [site for site in result.sites if site.verdict.level == level]
         told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
-        for one in join_reasons(told):
-            verb = "is" if len(one.sites) == 1 else "are"
-            notes.append(f"{one.names} {verb} {level}: {one.reason}")
+        for one in _fold_alike(join_reasons(told)):
+            verb, decides = ("is" if len(one.sites) == 1 else "are"), level != "proven" and one.reason.effect in DECIDES
+            notes.append((0 if decides else 1, f"{one.names} {verb} {level}: {one.reason}"))
     told = [(site.id, note) for site in result.sites for note in site.warnings]
-    return notes + [f"{one.names}: {one.reason}" for one in join_reasons(told)]
+    notes += [(2, f"{one.names}: {one.reason}") for one in join_reasons(told)]
+    return [text for _, text in sorted(notes, key=lambda note: note[0])]
+
+
+def _fold_alike(reasons: Sequence[SiteReason]) -> tuple[SiteReason, ...]:
+    """The reasons, with those of one code that many sites have in different words as one: the words of the first."""
+    folded: dict[str, SiteReason] = {}
+    many = {one.reason.code for one in reasons if sum(o.reason.code == one.reason.code for o in reasons) >= FOLDED}
+    for one in reasons:
+        key = one.reason.code if one.reason.code in many else f"{one.sites} {one.reason}"
+        before = folded.get(key)
+        if before is None:
+            folded[key] = one
+        else:
+            sites = tuple(sorted({*before.sites, *one.sites}))
+            folded[key] = SiteReason(sites, before.reason)
+    return tuple(folded.values())
 
 
 def cap_notes(notes: Sequence[str]) -> list[str]:

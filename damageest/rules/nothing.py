@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from damageest.artefacts import Reason
+from damageest.findings import Interval
 from damageest.rules import Rule, ScanFacts, SiteFacts
 
 NOTHING = 0.2
@@ -12,16 +13,29 @@ NOTHING = 0.2
 simulation on 498 groups of sites of 183 troubled scans."""
 
 
+CERTAIN = 0.1
+"""Share of the volume of the piece that is lost in any case, from which a site is a loss: deep in one place, though at
+the limit of what the scan tells in another."""
+
+
+def is_nothing(volume: float, interval: Interval, certain: float) -> bool:
+    """Whether a site may be no loss: its interval reaches down to nearly nothing, and no piece of it is certain."""
+    return interval[0] <= NOTHING * volume and certain <= CERTAIN * volume
+
+
 class Nothing(Rule):
     code = "nothing"
     meaning = "the interval of the volume reaches down to nearly nothing: the site may be no loss"
-    threshold = f"low end at most {NOTHING:.0%} of the volume, or no interval"
+    threshold = (
+        f"low end at most {NOTHING:.0%} of the volume, and no piece of {CERTAIN:.0%} of it lost in any case; or no "
+        "interval"
+    )
     remedy = "see what makes its interval wide"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.interval is None:
             yield Reason(self.code, "no scan points lie on its inner surface, and its volume has no interval", "widens")
-        elif site.interval[0] <= NOTHING * site.volume:
+        elif is_nothing(site.volume, site.interval, site.uncertainty.certain if site.uncertainty else 0.0):
             low, high = site.interval
             text = f"its volume is {low:.3g} to {high:.3g} {scan.unit}³: errors of scan, pose and form may explain it"
             yield Reason(self.code, text, "widens", low, f"{scan.unit}³")

@@ -21,6 +21,7 @@ POSE_CODES = {
     "other_poses": "poses fit that are not symmetries of the part; it matters where other metal is lost in them",
     "pose_free": "the part can be moved or turned a little and fits as well",
     "mirrored": "the scan fits better mirrored, and shows too little of the part to tell",
+    "wrong_scale": "the scan lies on the part far better in another scale",
     "datum_worn": "a datum is worn or not in its place: the datum system puts it, or the skin, elsewhere",
     "datum_decides": "the scan fits as well in poses that the datum system excludes: it decides which metal is lost",
     "given_pose": "in a pose nearby more of the scan lies on the part than in the given one",

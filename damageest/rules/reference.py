@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from damageest.rules import Rule
+from damageest.rules import RULE_FAILED, Rule
 from damageest.rules.notes import RUN_CODES
 from damageest.rules.pose import POSE_CODES
 
@@ -13,6 +13,9 @@ def format_reasons(rules: Iterable[Rule]) -> str:
     """Markdown: the codes of reasons for verdicts, of those that align gives against a pose, and of notes of a run."""
     lines = ["| code | meaning | given from | what to do |", "| --- | --- | --- | --- |"]
     lines += [f"| `{rule.code}` | {rule.meaning} | {rule.threshold} | {rule.remedy} |" for rule in rules]
+    lines.append(
+        f"| `{RULE_FAILED}` | a rule of a plugin failed, which the reason names | always | update the plugin |"
+    )
     lines += ["", "Against the pose, by the stage align (rule `pose`):", "", "| code | meaning |", "| --- | --- |"]
     lines += [f"| `{code}` | {meaning} |" for code, meaning in POSE_CODES.items()]
     lines += ["", "Notes of a run:", "", "| code | meaning |", "| --- | --- |"]

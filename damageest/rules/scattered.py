@@ -7,21 +7,24 @@ from collections.abc import Iterable
 from damageest.artefacts import Reason
 from damageest.rules import Rule, ScanFacts, SiteFacts
 
-SHALLOW, MANY = 2.0, 8
-"""Depth of a site in tolerances, in 95 % of its points, up to which it is shallow; and number of such sites from which
-waves explain them. An undamaged plate whose skin is wavy inward alone, by 1.5 tolerances, has 15."""
+SHALLOW, MANY, ALIKE = 2.0, 8, 0.1
+"""Depth of a site in tolerances, in 95 % of its points, up to which it is shallow; number of such sites from which
+waves explain them; and the share of its volume from which they are as large as it. An undamaged plate whose skin is
+wavy inward alone, by 1.5 tolerances, has 15."""
 
 
 class Scattered(Rule):
     code = "scattered"
     meaning = "many shallow sites: waves of the part's form or of the scanner explain them"
-    threshold = f"{MANY} sites no deeper than {SHALLOW:g} tolerances, of which it is one"
+    threshold = (
+        f"{MANY} sites no deeper than {SHALLOW:g} tolerances and of {ALIKE:.0%} of its volume, of which it is one"
+    )
     remedy = "a larger tolerance, or accept: all where it is wear"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.shallow >= MANY and site.deepest < SHALLOW * scan.tolerance:
             text = (
-                f"it is one of {site.shallow} sites that are no deeper than {SHALLOW:g} tolerances: waves of the "
-                "part's form or of the scanner may explain them"
+                f"it is one of {site.shallow} sites of its size or more, no deeper than {SHALLOW:g} tolerances: waves "
+                "of the part's form or of the scanner may explain them"
             )
             yield Reason(self.code, text, "contradicts", site.shallow, remedy=self.remedy)

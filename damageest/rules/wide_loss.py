@@ -12,19 +12,29 @@ WIDE, THIN = 0.12, 4.0
 error of a fitted pose that no unworn skin is known to hold: worn metal, or a part of another size, moves it."""
 
 
+ELSEWHERE = 0.5
+"""Share of its depth that a motion of the scan explains which puts nothing outside, from which it may be none."""
+
+
 class WideLoss(Rule):
     code = "wide_loss"
-    meaning = "a shallow loss covers much of the skin, and no unworn skin is known to hold the pose"
-    threshold = f"more than {WIDE:.0%} of the seen skin, and half of it shallower than {THIN:g} tolerances"
+    meaning = "a shallow loss covers much of the skin, and in a pose nearby it lies on other skin"
+    threshold = (
+        f"more than {WIDE:.0%} of the seen skin, half of it shallower than {THIN:g} tolerances, and {ELSEWHERE:.0%} of "
+        "its depth explained by a motion that puts no skin outside"
+    )
     remedy = "name faces that are not worn in align.datum; where the pose is known, give it to align: none"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if not scan.is_fitted or site.area <= WIDE * scan.seen_area or site.typical >= THIN * scan.tolerance:
             return
+        if site.elsewhere < ELSEWHERE:
+            return
         # a part that is worn all over shows no skin where its CAD has it
         share = f"{site.area / scan.seen_area:.0%} of the skin" if scan.seen_area > 0 else "all skin"
         text = (
             f"it covers {share} that the scan shows, {site.typical:.3g} {scan.unit} deep, and the pose was fitted to "
-            "the scan: the loss may lie elsewhere"
+            f"the scan: a motion that puts no skin outside explains {site.elsewhere:.0%} of it, and the loss may lie "
+            "elsewhere"
         )
         yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)

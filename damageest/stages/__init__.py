@@ -25,6 +25,7 @@ from damageest.io.files import expand_home, resolve_path
 from damageest.options import Options
 
 if TYPE_CHECKING:
+    from damageest.artefacts import Part
     from damageest.geometry.selectors import Selector
 
 Given = TypeVar("Given")
@@ -114,6 +115,11 @@ class Stage(Options):
             return [found for step, item in items for found in walk(item, (*place, step))]
 
         return walk(self, ())
+
+    def find_idle_region(self, selector: Selector, part: Part) -> str:
+        """Why a region of space among the options, which selects no skin, has no effect on this part; empty where it
+        may have one."""
+        return ""
 
     def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
         """What is wrong with the options that shows only beside the other stages of the ``job``, which are by their

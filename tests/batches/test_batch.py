@@ -76,6 +76,7 @@ def done(client: Any, tmp_path_factory: pytest.TempPathFactory) -> Done:
     return Done(words, rows, folder)
 
 
+@pytest.mark.slow
 def test_rows_of_a_batch(done: Done) -> None:
     rows = done.rows
     assert [row.name for row in rows] == ["job", "night-second", "night-gone", "faulty"]
@@ -86,6 +87,7 @@ def test_rows_of_a_batch(done: Done) -> None:
     assert {path.name for path in (done.folder / "b").glob("batch.*")} == {"batch.csv", "batch.json", "batch.html"}
 
 
+@pytest.mark.slow
 def test_a_job_of_a_batch_writes_the_same_bytes_as_a_run(done: Done) -> None:
     job = done.folder / "job.yaml"
     job.write_bytes((done.folder / "job.txt").read_bytes())
@@ -217,6 +219,7 @@ def test_a_killed_batch_goes_on(tmp_path: Path) -> None:
     assert not (tmp_path / "b" / NEW_ROWS).exists()
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("seconds", [0.2, 0.8, pytest.param(1.6, marks=pytest.mark.slow)])
 def test_ctrl_c_while_workers_start_gives_one_line(seconds: float, tmp_path: Path) -> None:
     """Workers of a cluster that got the signal of the terminal too would print tracebacks."""

@@ -87,4 +87,5 @@ def test_a_place_that_cannot_be_written_is_named_before_anything_runs(output: st
 
 def test_an_old_table_of_any_depth_is_none(tmp_path: Path) -> None:
     (tmp_path / "batch.json").write_text("[" * 200_000)
+    (tmp_path / NEW_ROWS).write_text("[" * 200_000 + "\n")
     assert read_rows(tmp_path) == {}

@@ -57,6 +57,7 @@ def chromium() -> Iterator[Any]:
         yield opened
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [700, pytest.param(10_000, marks=pytest.mark.slow)])
 def test_many_rows_in_a_browser(count: int, chromium: Any, tmp_path: Path) -> None:
     """Those to look at come first; others are drawn when they are scrolled to, searched for or sorted to the front."""

@@ -72,6 +72,7 @@ def write_page_of(job: Path, *settings: str) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_the_page_shows_the_picture_of_the_report(small_done: Path) -> None:
     """It comes from the report as a value, whatever its page looks like."""
     from PIL import Image
@@ -86,6 +87,7 @@ def test_a_run_without_a_report_has_no_picture(small_done: Path) -> None:
     assert "data:image" not in (write_page_of(small_done, "report=none") / "batch.html").read_text()
 
 
+@pytest.mark.slow
 def test_a_stage_that_ends_the_process_is_named(site: Site, tmp_path: Path) -> None:
     """The stage has no process of its own: it takes the job's process with it, and the row says which stage it was."""
     site.add("acme-bad", FAULTY)
@@ -106,6 +108,7 @@ def test_a_stage_of_a_site_that_ends_the_process_is_named(name: str, site: Site,
     assert text in row.error
 
 
+@pytest.mark.slow
 def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     site.add("acme-bad", FAULTY)
     job = damaged_box.write_least(tmp_path)
@@ -115,6 +118,7 @@ def test_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     assert row.error == "part: faulty: was ended: not finished after 2 s, the time limit of a job"
 
 
+@pytest.mark.slow
 def test_a_stage_of_a_job_that_hangs_is_ended(site: Site, tmp_path: Path) -> None:
     """It has no process of its own."""
     site.add("acme-bad", FAULTY)

@@ -25,6 +25,7 @@ def simulate(part: Part, **options: object) -> Scan:
     return Simulate.model_validate({"points": 6000, "noise": 0.04, **options}).run("mm", part)
 
 
+@pytest.mark.slow
 def test_one_view_shows_the_top_and_nothing_is_claimed_of_the_rest() -> None:
     result = run(box(), simulate(box(), scanners=TOP_ONLY))
     assert result.coverage
@@ -37,6 +38,7 @@ def test_one_view_shows_the_top_and_nothing_is_claimed_of_the_rest() -> None:
     assert not result.sites
 
 
+@pytest.mark.slow
 def test_without_a_scanner_position_the_reason_is_unknown() -> None:
     seen = simulate(box(), scanners=TOP_ONLY, positions_known=False)
     result = run(box(), seen)
@@ -44,6 +46,7 @@ def test_without_a_scanner_position_the_reason_is_unknown() -> None:
     assert [region.why for region in result.coverage.unseen] == ["unknown"]
 
 
+@pytest.mark.slow
 def test_a_full_scan_shows_all_and_damage_counts_as_seen() -> None:
     tool = {"tool": "sphere", "centre": [0, 0, Z / 2], "radius": 6}
     result = run(box(), simulate(box(), damage=[tool]))
@@ -53,6 +56,7 @@ def test_a_full_scan_shows_all_and_damage_counts_as_seen() -> None:
     assert result.damage_volume == pytest.approx(TRUE_VOLUME, rel=0.03)
 
 
+@pytest.mark.slow
 def test_regions_name_the_cad_faces_and_cells_add_up() -> None:
     mesh = trimesh.creation.box(SIZE)
     numbers = np.abs(mesh.face_normals).argmax(axis=1)

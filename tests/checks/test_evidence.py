@@ -23,6 +23,7 @@ def middle(body: Manifold) -> list[float]:
     return ((box[:3] + box[3:]) / 2).tolist()
 
 
+@pytest.mark.variants(6)
 @pytest.mark.parametrize("name", [name for name in TOOLS if name != "two"])
 def test_the_true_damage_is_consistent(name: str) -> None:
     case = scene(name)

@@ -39,6 +39,7 @@ def find(nominal: Any, damaged: Any, spacing: float, noise: float) -> tuple[Flag
     return find_turned(scan, part, Deviation(distance, face, label), TOLERANCE), places
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("spacing", "noise", "length"), [(0.12, 0.06, 30), (0.04, 0.06, 10)])
 def test_the_root_of_a_thin_wall_is_found(spacing: float, noise: float, length: float) -> None:
     found, places = find(make_plate(length) + make_wall(length), make_plate(length), spacing, noise)

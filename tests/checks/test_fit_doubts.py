@@ -32,6 +32,7 @@ def dented() -> Floats:
     return scan(scenes.block() - scenes.ball(2.5, 5, 4, 6))
 
 
+@pytest.mark.slow
 def test_it_is_said_of_a_damaged_part(dented: Floats) -> None:
     result = run(dented)
     assert result.fit is not None
@@ -39,6 +40,7 @@ def test_it_is_said_of_a_damaged_part(dented: Floats) -> None:
     assert len(result.sites) == 1
 
 
+@pytest.mark.slow
 def test_it_is_said_beside_a_weld_bead() -> None:
     result = run(scan(scenes.block() + scenes.slab((6, 3, 2), 0, 0, 6.8)))
     assert result.fit is not None
@@ -46,6 +48,7 @@ def test_it_is_said_beside_a_weld_bead() -> None:
     assert result.fit.model == "ok"
 
 
+@pytest.mark.slow
 def test_it_is_not_said_beside_sites_that_the_pose_makes(dented: Floats) -> None:
     result = run(dented + np.array([0.196, 0.0, 0.0]))
     assert result.fit is not None
@@ -57,6 +60,7 @@ def test_it_is_not_said_beside_sites_that_the_pose_makes(dented: Floats) -> None
     assert result.fit.words in [note.text for note in result.warnings]
 
 
+@pytest.mark.slow
 def test_it_is_not_said_beside_a_large_surplus() -> None:
     result = run(scan(scenes.block() + scenes.slab((22, 16, 3), 0, 0, 7), 3000))
     assert result.fit is not None

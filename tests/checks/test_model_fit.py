@@ -20,6 +20,7 @@ def test_a_part_as_designed_is_ok() -> None:
     assert not found.predict(*draw_skin(count=10)).any()
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("scale", [0.998, 1.02])
 def test_a_scale_is_named_with_its_size(scale: float) -> None:
     points, _ = draw_skin()
@@ -30,6 +31,7 @@ def test_a_scale_is_named_with_its_size(scale: float) -> None:
     assert "scale" in found.fit.words
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(
     ("how", "amount"), [("bend", 0.3), pytest.param("bend", 1.5, marks=pytest.mark.slow), ("twist", 0.3)]
 )
@@ -42,6 +44,7 @@ def test_a_deformation_is_named_with_its_amount(how: str, amount: float) -> None
     assert found.fit.deviations[0].left < found.fit.deviations[0].deviation
 
 
+@pytest.mark.slow
 def test_the_form_predicts_where_intact_skin_lies() -> None:
     points, normals = draw_skin(count=3000)
     how = Deformation(bend=0.8)
@@ -66,6 +69,7 @@ def test_a_broken_end_is_no_form() -> None:
     assert fit(add_noise(np.column_stack([end, points[:, 1:]])), "block").fit.model == "ok"
 
 
+@pytest.mark.slow
 def test_waves_are_named() -> None:
     points, normals = draw_skin()
     height = 0.25 * np.sin(points[:, 0] / 2.5) * np.cos(points[:, 1] / 2.5)

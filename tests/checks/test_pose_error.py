@@ -116,3 +116,15 @@ def test_volume_changes_as_that_of_a_moved_tool(axis: int) -> None:
     areas = np.linalg.norm(damage.cross[~inner], axis=1) / 2  # type: ignore[attr-defined]
     change = PoseError(np.zeros(3), spread, 0.0, 1.0).of_volume(own, damage.face_normals[~inner], areas)  # type: ignore[attr-defined]
     assert change[0] == pytest.approx(moved.volume - damage.volume, rel=0.01, abs=1e-4)  # type: ignore[attr-defined]
+
+
+def test_a_footprint_shares_the_error_as_far_as_it_is_alike() -> None:
+    """Over a square whose errors are alike within an edge, the mean of the correlation is that of the exact integral;
+    over one that is small against the edge, all of the error is common."""
+    error = PoseError(np.zeros(3), np.eye(6), 0.1, 1.0, alike=np.array([0.0]), edge=1.0)
+    places, areas = np.random.default_rng(0).uniform(size=(5000, 3)) * [1, 1, 0], np.ones(5000)
+    assert error.measure_common(0.01 * places, areas) > 0.99
+    apart = np.linalg.norm(np.diff((10 * places).reshape(-1, 2, 3), axis=1)[:, 0], axis=1)
+    exact = float(np.sqrt(np.clip(1 - apart, 0, None).mean()))
+    assert error.measure_common(10 * places, areas) == pytest.approx(exact, rel=0.25)
+    assert PoseError(np.zeros(3), np.eye(6), 0.1, 1.0).measure_common(places, areas) == 1.0

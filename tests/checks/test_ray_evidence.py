@@ -35,6 +35,7 @@ def run(
     return damageest.run({"version": 1, "tolerance": TOLERANCE, "align": "none"}, part=make(whole), scan=scan)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "points"), [("pin", 14_000), *(pytest.param(name, 50_000, marks=pytest.mark.slow) for name in LOST)]
 )
@@ -57,6 +58,7 @@ def test_a_whole_body_that_is_gone_is_a_proven_site() -> None:
     assert iou(result.damage, to_solid(second)) > 0.9
 
 
+@pytest.mark.slow
 def test_without_scanner_positions_a_lost_body_is_unseen_with_its_volume() -> None:
     second = Manifold.cube((10, 40, 10), True).translate((45, 0, -5))
     result = run(BASE + second, BASE, known=False)
@@ -65,6 +67,7 @@ def test_without_scanner_positions_a_lost_body_is_unseen_with_its_volume() -> No
     assert any(region.volume == pytest.approx(second.volume(), rel=0.1) for region in result.coverage.unseen)
 
 
+@pytest.mark.slow
 def test_rays_prove_nothing_on_an_undamaged_part() -> None:
     body = BASE + LOST["wall of two"] + LOST["pin"]
     result = run(body, body)

@@ -38,6 +38,7 @@ def intact() -> Result:
     return run(part, scan_by_camera(part, seed=2))
 
 
+@pytest.mark.slow
 def test_errors_of_a_clean_scan_are_its_noise() -> None:
     part = PARTS["ribbed_plate"]()
     scan = Simulate(points=8000, noise=0.05, scanners=6).run("mm", part)
@@ -99,6 +100,7 @@ def test_places_below_a_tolerance_that_the_sensor_does_not_allow_are_no_sites() 
     assert len(shown.sites) > len(result.sites)
 
 
+@pytest.mark.slow
 def test_a_loss_deeper_than_the_errors_is_found() -> None:
     part = PARTS["block"]()
     top = part.bounds[1]
@@ -113,6 +115,7 @@ def test_a_loss_deeper_than_the_errors_is_found() -> None:
     assert np.isfinite(low)
 
 
+@pytest.mark.slow
 def test_where_the_scan_is_noisier_a_loss_has_to_be_deeper() -> None:
     """By place: half of a plate is scanned with four times the noise."""
     part = PARTS["ribbed_plate"]()

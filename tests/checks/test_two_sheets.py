@@ -81,6 +81,7 @@ def test_wear_of_about_a_tolerance_is_one_surface_with_noise(depth: float) -> No
     assert measure(lower_top(points, depth * TOLERANCE, points[:, 0] > -8)) < AGAINST / 2
 
 
+@pytest.mark.slow
 def test_a_false_site_of_a_misplaced_view_is_doubtful_and_names_the_cause() -> None:
     first, second = scan_box(1, points=6000), scan_box(2, points=6000)
     low = lower_top(second, 1.5 * TOLERANCE, np.linalg.norm(second[:, :2] - [4, 2], axis=1) < 7)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total
+from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, measure_certain
 
 SIZES = st.floats(0.0, 10.0)
 ERRORS = st.builds(
@@ -34,6 +34,7 @@ def half_width(errors: list[SiteError]) -> float:
     return (high - low) / 2
 
 
+@pytest.mark.slow
 @given(ERRORS)
 def test_interval_holds_the_volume_and_no_negative_one(error: SiteError) -> None:
     (low, high), (shallow, deep) = combine_site(error)
@@ -97,3 +98,23 @@ def test_doubtful_sites_raise_the_high_end() -> None:
 
 def test_no_site_has_no_error() -> None:
     assert combine_total(0.0, []) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize("name", ["spacing", "rim", "form"])
+def test_what_is_the_same_error_in_each_site_adds_as_it_is(name: str) -> None:
+    """Twenty equal sites: the total is as uncertain as twenty times one of them. Noise averages out."""
+    site = replace(PLAIN, noise=0.0, **{name: 3.0})
+    assert half_width([site] * 20) == pytest.approx(20 * half_width([site]))
+    assert half_width([PLAIN] * 20) == pytest.approx(20**0.5 * half_width([PLAIN]))
+
+
+def test_skin_that_may_lie_deeper_takes_no_more_off_than_is_lost_there() -> None:
+    """Half of a site is 0.4 deep and half 0.1; the skin may lie 0.2 deeper: the deep half is still lost by 0.2. Of a
+    site of one depth, the low end is a fifth where nothing of it is certain."""
+    depths = np.repeat([0.1, 0.4], 25)
+    site = SiteError(25.0, 0.0, 0.0, 0.0, 0.0, form=10.0, exposed=100.0, depths=depths)
+    assert combine_site(site)[0] == pytest.approx((10.0, 45.0))
+    assert measure_certain(site) == pytest.approx(7.5)
+    even = replace(site, depths=np.full(50, 0.25))
+    assert combine_site(even)[0][0] == pytest.approx(5.0)
+    assert measure_certain(even) == pytest.approx(0.0)

@@ -34,12 +34,14 @@ def measure(result: damageest.Result, damage: Solid) -> float:
     return measure_unseen_rim(damage, result.part, result.coverage, 1.0)
 
 
+@pytest.mark.slow
 def test_a_rim_that_the_scan_shows_has_no_share() -> None:
     result, damage = scan_dent(100)
     assert measure(result, damage) == 0
     assert result.sites[0].verdict.level == "proven"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kept", "share"), [pytest.param(0.0, 0.5, marks=pytest.mark.slow), (3.0, 0.38)])
 def test_the_share_is_that_of_the_rim_in_the_unseen_skin(kept: float, share: float) -> None:
     result, damage = scan_dent(kept)
@@ -50,6 +52,7 @@ def test_the_share_is_that_of_the_rim_in_the_unseen_skin(kept: float, share: flo
     assert site.volume_95[0] <= damage.volume < site.volume_95[1] == np.inf
 
 
+@pytest.mark.slow
 def test_a_solid_without_a_rim_has_no_share() -> None:
     result, _ = scan_dent(3.0)
     ball = trimesh.creation.icosphere(2, 2.0)

@@ -40,6 +40,7 @@ def test_views_that_agree_are_left_alone() -> None:
     assert found.views == ()
 
 
+@pytest.mark.slow
 def test_a_misplaced_view_is_named_and_put_right() -> None:
     part, true = get_part("rib_bracket"), make_motion(0.8, 0.3)
     scan = make_scan(true)
@@ -58,6 +59,7 @@ def test_a_misplaced_view_is_named_and_put_right() -> None:
     assert found.views[1].turn == pytest.approx(0.3, abs=0.1)
 
 
+@pytest.mark.slow
 def test_a_view_is_named_only_where_it_is_not_to_be_corrected() -> None:
     found = fit_views(get_part("rib_bracket"), make_scan(make_motion(0.8, 0)), TOLERANCE, False)
     assert found is not None
@@ -81,6 +83,7 @@ def test_a_scan_without_views_is_not_compared() -> None:
     assert fit_views(get_part("rib_bracket"), Scan(scan.points, noise=NOISE), TOLERANCE, True) is None
 
 
+@pytest.mark.slow
 def test_wear_that_one_view_alone_shows_is_not_fitted_away() -> None:
     """All of the top is worn, and only view 0 shows it: it lies with the others beside the top, and stays."""
     part = get_part("rib_bracket")
@@ -102,6 +105,7 @@ def test_wear_that_one_view_alone_shows_is_not_fitted_away() -> None:
             assert 0 not in [one.number for one in found.views if one.is_corrected]
 
 
+@pytest.mark.slow
 def test_files_without_scanner_positions_are_views_as_well() -> None:
     scan = make_scan(make_motion(0.8, 0.3))
     found = fit_views(

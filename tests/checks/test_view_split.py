@@ -52,6 +52,7 @@ def deepen(amount: float, turn: float = 0.0) -> Floats:
     return T
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", ["rib_bracket", "lever"])
 @pytest.mark.parametrize(("amount", "turn"), [(1.5, 0.0), (0.0, 0.5)])
 def test_views_one_after_the_other_are_told_apart_and_put_right(name: str, amount: float, turn: float) -> None:

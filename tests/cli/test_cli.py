@@ -47,6 +47,7 @@ def test_run_prints_a_table_and_writes_the_folder(command_run: Ran) -> None:
     } == written
 
 
+@pytest.mark.slow
 def test_the_job_that_a_run_writes_gives_the_same(least_done: Path, tmp_path: Path) -> None:
     done = tmp_path / "out/job"
     assert call_here("run", done / "job.yaml", "--output", tmp_path / "again", "--quiet") == (0, "")
@@ -83,6 +84,7 @@ def test_every_job_is_checked_before_the_first_runs(tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.slow
 def test_validate(tmp_path: Path) -> None:
     good = damaged_box.write_least(tmp_path)
     assert call_here("validate", good)[0] == 0
@@ -95,11 +97,21 @@ def test_validate(tmp_path: Path) -> None:
     assert done.stdout == ""
 
 
-def test_init_writes_a_job_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def write_new_job(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(damaged_box.write_least(tmp_path).parent)
     status, said = call_here("init", "box.stl", "scan.ply", "--job", "new.yaml")
     assert status == 0, said
+
+
+def test_init_writes_a_job_that_is_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_new_job(tmp_path, monkeypatch)
     assert "noise 0.04" in (tmp_path / "new.yaml").read_text()
+    assert call_here("validate", "new.yaml")[0] == 0
+
+
+@pytest.mark.slow
+def test_init_writes_a_job_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    write_new_job(tmp_path, monkeypatch)
     quick = ("--set", "tolerance=0.6", "--set", "align=none", "--set", "report=none")
     assert call_here("run", "new.yaml", *quick)[0] == 0
 
@@ -164,6 +176,7 @@ def list_meshes(folder: Path) -> dict[str, bytes]:
     return found
 
 
+@pytest.mark.slow
 def test_another_number_of_threads_gives_the_same_bytes(least_done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("OMP_NUM_THREADS", "IGL_NUM_THREADS"):
         monkeypatch.setenv(name, "1")  # the option sets them

@@ -17,6 +17,7 @@ from damageest.cli import app, doctor
 from damageest.errors import describe_install
 
 
+@pytest.mark.slow
 def test_a_sound_installation_gives_the_true_volume() -> None:
     done = CliRunner().invoke(app, ["doctor", "--json"])
     found = json.loads(done.stdout)
@@ -37,6 +38,7 @@ def test_a_wrong_volume_and_a_missing_extra_are_said(monkeypatch: pytest.MonkeyP
     assert f"extra report: not installed; {describe_install('report')}" in done.output
 
 
+@pytest.mark.slow
 def test_the_shell_is_told_the_commands_that_a_word_begins(tmp_path: Path) -> None:
     asked = {"COMP_WORDS": "damageest do", "COMP_CWORD": "1", "_DAMAGEEST_COMPLETE": "complete_bash"}
     command = [sys.executable, "-c", "import sys; sys.argv[0] = 'damageest'; from damageest.cli import main; main()"]

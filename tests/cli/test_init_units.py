@@ -25,6 +25,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_tolerance_is_measured_in_the_unit_of_the_scan(home: Path) -> None:
     status, said = call("init", "box.stl", "inches.ply", "--job", "wrong.yaml")
     assert status == 0

@@ -71,7 +71,7 @@ def _end() -> Iterator[None]:
 
 @pytest.mark.parametrize(
     "name",
-    [name if name in ("abort", "memory", "hang") else pytest.param(name, marks=pytest.mark.slow) for name in FAULTS],
+    [name if name in ("memory", "hang") else pytest.param(name, marks=pytest.mark.slow) for name in FAULTS],
 )
 def test_each_fault_is_the_stages_own(name: str, site: Site, small_done: Path) -> None:
     """From Python."""
@@ -89,6 +89,7 @@ def test_each_fault_is_the_stages_own(name: str, site: Site, small_done: Path) -
     assert {file: after[file] for file in before} == before
 
 
+@pytest.mark.slow
 def test_a_hang_on_the_command_line(site: Site, small_done: Path) -> None:
     site.add("acme-bad", ALIGN.replace("BODY", FAULTS["hang"][0]))
     status, said = call("run", small_done, "--set", "align=faulty", "--stage-timeout", "0.5")
@@ -98,6 +99,7 @@ def test_a_hang_on_the_command_line(site: Site, small_done: Path) -> None:
     assert "acme-bad 1.2" in said
 
 
+@pytest.mark.slow
 def test_sys_exit_in_a_stage_without_a_process_of_its_own(site: Site, small_done: Path) -> None:
     body = "return Solid(damage.vertices * self.factor, damage.faces)"
     site.add("acme-bad", GROWN.replace(body, "import sys; sys.exit(0)"))
@@ -117,6 +119,7 @@ def test_method_auto_goes_on_after_a_crash(site: Site, small_done: Path, tmp_pat
     assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.05)
 
 
+@pytest.mark.slow
 def test_the_same_result_as_without_isolation(
     site: Site, small_done: Path, small_result: Result, tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:

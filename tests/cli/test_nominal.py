@@ -35,6 +35,7 @@ def write_runs(folder: Path) -> list[str]:
     return [str(folder / f"out-{number}") for number in range(len(AMOUNTS))]
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("suffix", ["stl", "ply"])
 def test_the_mean_of_three_parts(suffix: str, tmp_path: Path) -> None:
     path = tmp_path / f"new/mean.{suffix}"

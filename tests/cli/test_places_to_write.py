@@ -53,6 +53,7 @@ def test_nominal(target: str, said: str, home: Path) -> None:
     assert (status, said in text) == (2, True), text
 
 
+@pytest.mark.slow
 def test_run_and_batch(home: Path) -> None:
     job = damaged_box.write_small(home)
     for words in (["run", job, "-o", "file"], ["run", job, "-o", "file/out"], ["run", job, "--set", "output=file/out"]):

@@ -73,6 +73,7 @@ def damageest_stages():
 '''
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("is_run_again", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_an_interrupt_says_what_is_kept(is_run_again: bool, site: Site, tmp_path: Path) -> None:
     site.add("acme-waiting", WAITING)

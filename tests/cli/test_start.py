@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from damageest.registry import Registry
 from damageest.registry.loading import OWN
 from damageest.registry.registry import check_defaults
@@ -66,11 +68,13 @@ def test_help_imports_nothing_heavy(tmp_path: Path) -> None:
         assert loaded <= {"pydantic"}, command  # typer imports it
 
 
+@pytest.mark.slow
 def test_validate_imports_numpy_alone(tmp_path: Path) -> None:
     damaged_box.write_least(tmp_path)
     assert find_loaded(tmp_path, "validate job.yaml") == {"validate job.yaml": {"numpy", "pydantic"}}
 
 
+@pytest.mark.slow
 def test_a_run_says_its_name_before_it_imports_what_it_runs_on(tmp_path: Path) -> None:
     damaged_box.write_least(tmp_path)
     (tmp_path / "box.stl").write_bytes(b"nonsense")  # so that it ends soon

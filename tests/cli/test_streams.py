@@ -74,6 +74,7 @@ def mark_slow(second: str, *ways: str) -> list[Any]:
     return [pair if pair in quick else pytest.param(*pair, marks=pytest.mark.slow) for pair in pairs]
 
 
+@pytest.mark.variants(1, slow=4)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 @pytest.mark.parametrize(("name", "stream"), mark_slow("schema", *WORDS))
 def test_standard_output_that_takes_nothing_is_named(name: str, stream: str, ready: Path) -> None:
@@ -86,6 +87,7 @@ def test_standard_output_that_takes_nothing_is_named(name: str, stream: str, rea
         assert json.loads((ready / "out/job/result.json").read_text())["status"] == "ok"
 
 
+@pytest.mark.variants(1, slow=4)
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no /dev/full here")
 @pytest.mark.parametrize(("name", "stream"), mark_slow("help", "2>/dev/full", "2>&-"))
 def test_standard_error_that_takes_nothing_changes_nothing(name: str, stream: str, ready: Path) -> None:
@@ -120,6 +122,7 @@ def test_a_run_that_computes_without_any_stream_writes_its_result(stream: str, r
     assert shell(f"run job.yaml -q {stream}", ready).returncode == 0, "it prints nothing, so nothing is missing"
 
 
+@pytest.mark.variants(1, slow=4)
 @pytest.mark.parametrize(("name", "encoding"), mark_slow("help", "ascii", "latin-1"))
 def test_another_encoding_shows_what_it_can(name: str, encoding: str, ready: Path) -> None:
     env = {**os.environ, "PYTHONIOENCODING": encoding, "PYTHONUTF8": "0"}
@@ -140,6 +143,7 @@ def test_characters_that_an_encoding_has_not_are_written_in_others() -> None:
 ASCII = {"PYTHONUTF8": "0", "PYTHONCOERCECLOCALE": "0", "LC_ALL": "POSIX"}
 
 
+@pytest.mark.slow
 def test_an_ascii_locale_reads_a_job(ready: Path) -> None:
     (ready / "schräg").mkdir()
     shutil.copy(ready / "scan.ply", ready / "schräg/scan.ply")
@@ -208,6 +212,7 @@ def test_json_is_alone_on_standard_output(kind: str, site: Site, ready: Path) ->
     assert len(find_printed(ran.stderr)) == 4
 
 
+@pytest.mark.slow
 @needs_plugin("cadquery")
 @pytest.mark.parametrize(
     "command",
@@ -226,6 +231,7 @@ def test_json_of_other_commands_is_alone_too(command: str, site: Site, ready: Pa
         assert len(find_printed(ran.stderr)) == 4
 
 
+@pytest.mark.slow
 def test_a_file_name_that_is_no_text_is_shown(ready: Path) -> None:
     name = os.fsdecode(b"sc\xffn.yaml")
     os.rename(ready / "job.yaml", ready / name)
@@ -249,6 +255,7 @@ def test_an_old_result_of_any_depth_is_named(command: str, ready: Path) -> None:
     assert "cannot be read as a result" in said
 
 
+@pytest.mark.slow
 def test_a_run_replaces_an_old_result_of_any_depth(ready: Path) -> None:
     (ready / "out/job/result.json").write_text(DEEP)
     assert call("run", ready / "job.yaml", "-q") == (0, "")

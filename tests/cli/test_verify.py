@@ -36,6 +36,7 @@ def test_an_output_as_the_run_left_it(home: Path) -> None:
     assert verify(home)[0] == 0, "files of the user are none of the result's"
 
 
+@pytest.mark.slow
 def test_every_file_and_input_is_watched(home: Path) -> None:
     content = json.loads((home / "out/job/result.json").read_text())
     outputs = [item["path"] for item in content["provenance"]["outputs"]]
@@ -62,6 +63,7 @@ def test_a_changed_number_in_the_result_is_noticed(home: Path) -> None:
     assert "result.json: was changed" in verify(home)[1]
 
 
+@pytest.mark.slow
 def test_a_repeated_run_gives_the_same(home: Path) -> None:
     """From result.json alone: without job files, kept stages and in another folder."""
     (home / "job.yaml").unlink()
@@ -74,6 +76,7 @@ def test_a_repeated_run_gives_the_same(home: Path) -> None:
     assert sorted(path.name for path in home.rglob("*")) == before
 
 
+@pytest.mark.slow
 def test_a_repeated_run_that_differs_says_where(home: Path) -> None:
     scan = (home / "scan.ply").read_bytes()
     head, body = scan.split(b"end_header\n", 1)

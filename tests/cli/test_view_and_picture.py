@@ -104,6 +104,7 @@ class Window:
         return lambda *_, **__: None
 
 
+@pytest.mark.slow
 def test_each_layer_of_the_window_has_a_switch(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Which layers are shown at first, and that each switch shows and hides its own."""
     import pyvista

@@ -139,6 +139,7 @@ def test_a_fault_that_ends_no_process_is_an_error_of_the_stage(name: str, site: 
     assert "acme-bad 1.2" in said or name == "memory"
 
 
+@pytest.mark.slow
 def test_a_plugin_that_crashes_as_it_is_loaded_is_named(site: Site, tmp_path: Path) -> None:
     site.add("acme-broken", "import os; os.abort()")
     command = [*MAIN, str(damaged_box.write_small(tmp_path))]
@@ -177,6 +178,7 @@ def add_reader(site: Site, folder: Path, body: str, isolated: bool = False) -> P
     return folder / "part.acme"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("isolated", [True, False])
 def test_a_reader_that_crashes_is_named_by_faces(isolated: bool, site: Site, tmp_path: Path) -> None:
     """As OpenCASCADE on a damaged file: with a process of its own it is the file's fault."""
@@ -188,6 +190,7 @@ def test_a_reader_that_crashes_is_named_by_faces(isolated: bool, site: Site, tmp
     assert "acme-reader 1.2" in said
 
 
+@pytest.mark.slow
 def test_an_observer_that_exits_is_a_warning(site: Site, small_done: Path) -> None:
     import importlib
 
@@ -199,6 +202,7 @@ def test_an_observer_that_exits_is_a_warning(site: Site, small_done: Path) -> No
         assert damageest.run(small_done, registry=Registry.discover([watcher]), output=True).sites
 
 
+@pytest.mark.slow
 @needs_terminal()
 @pytest.mark.parametrize("how", ["terminal", "killed"])
 def test_the_process_that_works_ends_with_the_one_that_watches(how: str, site: Site, tmp_path: Path) -> None:
@@ -234,6 +238,7 @@ def test_the_process_that_works_ends_with_the_one_that_watches(how: str, site: S
         os.close(terminal)
 
 
+@pytest.mark.slow
 def test_a_crash_after_ctrl_c_is_an_end_by_ctrl_c(site: Site, tmp_path: Path) -> None:
     """Native code that calls Python may abort where it is interrupted."""
     mark = tmp_path / "mark"
@@ -264,6 +269,7 @@ def _read(terminal: int) -> bytes:
         return b""
 
 
+@pytest.mark.slow
 def test_what_a_plugin_left_open_is_written_before_the_process_ends(site: Site, tmp_path: Path) -> None:
     """The fork ends without taking down its objects; its threads, exit handlers and files come first."""
     left = (

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
 import pickle
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
@@ -216,6 +217,7 @@ def test_there_is_one_good_for_every_class() -> None:
     assert GOOD.keys() == MEANING.keys() == every
 
 
+@pytest.mark.variants(7)
 @pytest.mark.parametrize("name", GOOD)
 def test_a_wrong_type(name: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError):
@@ -311,3 +313,40 @@ def test_a_check_that_is_no_check_cannot_be_excepted(tmp_path: Path) -> None:
     made.exceptions = {"test_of_nothing": "because"}
     with pytest.raises(AssertionError, match="exceptions must name checks"):
         StageContract.test_declares_itself(made)
+
+
+class Fixture(KnownPose):
+    """A pose that a fixture gives, by the name of a stranger; it does not say that it is known."""
+
+    use: Literal["fixture"] = "fixture"  # type: ignore[assignment]
+    gives_fitted_pose: ClassVar[bool] = True
+
+
+class InOneProcess(NoRepair):
+    """Works with what only this process has."""
+
+    use: Literal["here"] = "here"  # type: ignore[assignment]
+    isolated: ClassVar[bool] = True
+
+    def run(self, enclosure: Mesh) -> Solid:
+        if os.getpid() != HERE:
+            raise RuntimeError("no licence in this process")
+        return Solid(enclosure.vertices, enclosure.faces)
+
+
+HERE = 0
+"""The process of the tests, once it is set there alone."""
+
+
+def test_a_known_pose_that_does_not_say_so_is_caught() -> None:
+    case = type("Case", (conformance.AlignContract,), {"stage": Fixture(), "pose": np.eye(4), "_results": {}})
+    with pytest.raises(AssertionError, match="gives_fitted_pose is True, but the pose stays"):
+        case().test_says_whether_the_pose_is_fitted()
+
+
+def test_a_stage_that_works_in_the_engines_process_alone_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(globals(), "HERE", os.getpid())
+    case = type("Case", (conformance.RepairContract,), {"stage": InOneProcess(), "_results": {}})
+    case().test_gives_its_type()
+    with pytest.raises(RuntimeError, match="no licence in this process"):
+        case().test_runs_in_a_process_of_its_own()

@@ -67,18 +67,16 @@ WITH: dict[str, dict[str, Any]] = {
 """By implementation: the ``options`` to check it with, and other attributes of its class."""
 
 
+FIRST = "enclose divide"
 SLOW = {
     *("align icp", "align register", "adapt auto", "adapt smooth", "part brep"),
-    *(
-        "reconstruct ball_pivot",
-        "reconstruct pymeshlab",
-        "background bbox",
-        "background capsule",
-        "background cylinder",
-    ),
-    *("enclose adaptive", "enclose octree", "enclose poisson_subtract", "enclose shortest_path", "enclose sweep"),
+    *("reconstruct ball_pivot", "reconstruct pymeshlab"),
+    *("background bbox", "background capsule", "background cylinder"),
+    *("enclose adaptive", FIRST, "enclose octree", "enclose poisson_subtract", "enclose shortest_path"),
+    "enclose sweep",
 }
-"""Implementations of which -m slow makes all checks, and the default run those of `BRIEF`."""
+"""Implementations of which -m slow makes all checks, and a run of its own those of `BRIEF`: the default run of the
+first."""
 ELSEWHERE = {"align register", "adapt auto", "enclose poisson_subtract", "part brep"}
 """Those of them that the default run leaves out here, since one run takes 2 s or more: each job runs the first,
 `adapt: smooth` is what the second runs, and the plugins have tests of their own of the others."""
@@ -104,7 +102,8 @@ for _item in FOUND:
     globals()[f"Test_{_item.contract.stage}_{_item.name}"] = case(_item)
 
 
-@pytest.mark.parametrize("name", sorted(SLOW - ELSEWHERE))
+@pytest.mark.variants(1)
+@pytest.mark.parametrize("name", sorted(SLOW - ELSEWHERE, key=lambda name: (name != FIRST, name)))
 def test_one_run_of_a_slow_one(name: str) -> None:
     if (checks := globals().get(f"Test_{name.replace(' ', '_')}")) is None:
         pytest.skip("its plugin cannot be used here")
@@ -120,6 +119,7 @@ def test_a_class_for_every_contract(contract: type) -> None:
     assert [item for item in FOUND if item.contract is contract]
 
 
+@pytest.mark.slow
 def test_its_import_is_cheap() -> None:
     heavy = {"scipy", "igl", "trimesh", "manifold3d", "pyvista", "vtk", "pymeshlab", "open3d", "cadquery"}
     code = f"import sys, damageest.conformance; print(*({heavy} & sys.modules.keys()))"

@@ -36,6 +36,7 @@ def worker(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Worker]:
     one.stop()
 
 
+@pytest.mark.variants(37)
 @pytest.mark.parametrize("name", [pytest.param(one, marks=() if one in QUICK else pytest.mark.slow) for one in HERE])
 def test_sound_files_are_read(name: str, worker: Worker, tmp_path: Path) -> None:
     """What the fuzzing spoils is right before."""
@@ -56,6 +57,7 @@ def check_spoiled(count: int, whole: float, worker: Worker) -> None:
     assert any(row["whole"] for row in rows)
 
 
+@pytest.mark.slow
 def test_spoiled_files_are_refused_or_read(worker: Worker) -> None:
     check_spoiled(len(QUICK), 0.06, worker)
 
@@ -97,6 +99,7 @@ def test_what_failed_once_is_refused(name: str, kind: str, seed: str, worker: Wo
     assert row["outcome"] in GOOD, row
 
 
+@pytest.mark.slow
 def test_a_scan_without_a_clear_normal_is_placed_as_given(tmp_path: Path, registry: Registry) -> None:
     """The scan of the first one above, as far as it failed."""
     seeds.write_others(tmp_path)

@@ -258,6 +258,7 @@ JOBS: dict[str, tuple[str, str]] = {
 }  # fmt: skip
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", JOBS)
 def test_hostile_jobs_are_refused(name: str, tmp_path: Path) -> None:
     from typer.testing import CliRunner
@@ -296,6 +297,7 @@ def test_what_is_no_file_is_no_job(name: str, tmp_path: Path) -> None:
     assert not done.exception or isinstance(done.exception, SystemExit)
 
 
+@pytest.mark.slow
 def test_merged_mappings_and_dates_are_read(tmp_path: Path) -> None:
     from damageest.job import yamlfile
 

@@ -71,6 +71,7 @@ def run_with_far_points(path: Path) -> tuple[float, list[int]]:
     return content["damage_volume"], [n["amount"] for n in content["warnings"] if n["code"] == "far_points"]
 
 
+@pytest.mark.slow
 def test_far_points_are_set_aside_counted_and_said(small_done: Path, small_result: Result) -> None:
     """They change nothing of what is found."""
     assert run_with_far_points(small_done) == (small_result.damage_volume, [20])

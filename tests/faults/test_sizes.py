@@ -22,6 +22,7 @@ ENOUGH = 5000
 """Points from which a pose is found; below it a refusal is right."""
 
 
+@pytest.mark.variants(slow=10)
 @pytest.mark.parametrize("case", [pytest.param(case, id=case.name, marks=mark(case)) for case in ALL])
 def test_a_job_of_any_size_is_right_or_doubted_or_refused_in_words(case: Case, registry: Registry) -> None:
     row = run_case(case, registry)

@@ -42,6 +42,7 @@ def limit_files(kilobytes: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("kilobytes", [0, 8, pytest.param(100, marks=SLOW), pytest.param(140, marks=SLOW)])
 def test_a_full_disk(kilobytes: int, small_done: Path) -> None:
     out = small_done.parent / "out"
@@ -90,6 +91,7 @@ def test_a_file_that_vanishes(small_done: Path) -> None:
     assert strip(out) == before
 
 
+@pytest.mark.slow
 def test_an_output_folder_that_vanishes(small_done: Path) -> None:
     out = small_done.parent / "out"
     registry = Registry.discover([Trouble("export", lambda: shutil.rmtree(out))])
@@ -99,6 +101,7 @@ def test_an_output_folder_that_vanishes(small_done: Path) -> None:
     assert files(out / "job")["damage.stl"] == "another", "and another run finds the place in order"
 
 
+@pytest.mark.slow
 def test_a_clock_that_jumps(small_done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     before = strip(small_done.parent / "out/job")
     jumps = iter(np.random.default_rng(0).uniform(0, 4e9, 1_000_000).tolist())
@@ -110,6 +113,7 @@ def test_a_clock_that_jumps(small_done: Path, monkeypatch: pytest.MonkeyPatch) -
 ODD = ["a\nb", "ñ 零件 قطعة", "'\"$(x)`;&| %s{}*?[a]", "a b", "-rf", "…\u202e"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["-" + "".join(ODD), *(pytest.param(name, marks=SLOW) for name in ODD)])
 def test_odd_names(name: str, tmp_path: Path) -> None:
     """Of the folder, the files, the job and the output."""
@@ -145,6 +149,7 @@ def test_stopped_at_random_moments(count: int, commands: tuple[str, ...]) -> Non
     assert sum(trial.hit for trial in trials) >= count / 2
 
 
+@pytest.mark.slow
 def test_a_run_of_the_app_ends_with_the_app(tmp_path: Path) -> None:
     """However the app ends: else its run goes on unseen, and the next one is refused."""
     damaged_box.write_small(tmp_path)

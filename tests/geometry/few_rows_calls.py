@@ -21,6 +21,7 @@ from damageest.geometry import (
     duplicates,
     face_labels,
     far_points,
+    filled,
     healing,
     height_spline,
     local_fits,
@@ -31,20 +32,24 @@ from damageest.geometry import (
     neighbourhoods,
     noise,
     open_surfaces,
+    orientation,
     pieces,
     point_pieces,
     poisson,
+    polygons,
     pseudonormals,
     rays,
     refinement,
     remaining,
     sampling,
     shapes,
+    sheets,
     skin_near,
     slivers,
     smooth_faces,
     solids,
     spreading,
+    stacks,
     stiff_modes,
     touching,
     transforms,
@@ -160,6 +165,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         spreading.spread_points(r.mesh.triangles, np.arange(len(r.mesh.faces)), 0.5), (None, 3), (None,)
     ),
     "spreading.thin": lambda r: expect(spreading.thin(r.points, 0.5, 0.5), (None,)),
+    "stacks.find_stacks": lambda r: expect(np.asarray(stacks.find_stacks(r.points) is None), ()),
     "stiff_modes.name_modes": lambda r: expect(np.asarray(stiff_modes.name_modes(r.points, r.points)[1]), ()),
     "undoing.undo": lambda r: expect(undoing.undo(STILL, r.points), (r.count, 3)),
     "undoing.cut_to_follow": lambda r: expect(undoing.cut_to_follow(r.mesh, np.copy, 1.0)[0], (None, 3)),
@@ -188,6 +194,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "duplicates.find_members": lambda r: expect(duplicates.find_members(np.arange(5), r.numbers), (5,)),
     "duplicates.list_used": lambda r: expect(duplicates.list_used(r.mesh.faces), (3 * len(r.mesh.faces),)),
     "duplicates.find_duplicates": lambda r: expect(duplicates.find_duplicates(r.points), (None,), (r.count,)),
+    "filled.find_filled": lambda r: expect(filled.find_filled(r.points, 0.1), (r.count,)),
     "far_points.find_far": lambda r: expect(far_points.find_far(r.points, 1.0), (r.count,)),
     "healing.heal": lambda r: expect(healing.heal(r.mesh.vertices, r.mesh.faces)[1], (None, 3)),
     "height_spline.fit_height_plane": lambda r: expect(height_spline.fit_height_plane(r.mesh)[0], (3, 3)),
@@ -221,6 +228,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
         (None,),
     ),
     "neighbourhoods.gather_around": call_gather,
+    "neighbourhoods.query_at_few": lambda r: expect(
+        neighbourhoods.query_at_few(CUBE.vertices, r.points, 2, r.rng)[0], (r.count, 2)
+    ),
     "neighbourhoods.find_in_box": lambda r: expect(
         neighbourhoods.find_in_box(r.points, np.full(3, -1e9), np.full(3, 1e9)), (r.count,)
     ),
@@ -234,11 +244,15 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "neighbourhoods.measure_local_areas": lambda r: expect(neighbourhoods.measure_local_areas(r.points), (r.count,)),
     "noise.find_least_depth": lambda r: expect(noise.find_least_depth(r.points[:, 0], 0.1, 0.0, 0.1), (None,)),
     "noise.measure_noise_and_spacing": lambda r: expect(np.array(noise.measure_noise_and_spacing(r.points)), (2,)),
+    "noise.measure_scatter": lambda r: expect(noise.measure_scatter(np.zeros((r.count, 9, 3))), (r.count,)),
     "noise.measure_quiet_noise": lambda r: expect(np.array([noise.measure_quiet_noise(r.points)]), (1,)),
     "open_surfaces.centre_points": lambda r: expect(open_surfaces.centre_points(r.points), (3,)),
     "open_surfaces.thin_for_surface": lambda r: expect(open_surfaces.thin_for_surface(r.points, 1.0), (None, 3)),
     "open_surfaces.orient_points": lambda r: expect(
         open_surfaces.orient_points(r.points, PART, 1.0, 0.1), (None, 3), (None, 3)
+    ),
+    "open_surfaces.draw_to_points": lambda r: expect(
+        open_surfaces.draw_to_points(r.mesh.vertices, r.mesh.faces, r.points, r.points), (None, 3)
     ),
     "open_surfaces.trim_surface": lambda r: expect(
         open_surfaces.trim_surface(r.mesh.vertices, r.mesh.faces, r.points, 1e6, PART, 1e6).faces, (None, 3)
@@ -246,13 +260,19 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "open_surfaces.take_largest_piece": lambda r: expect(open_surfaces.take_largest_piece(r.mesh.faces), (None, 3)),
     "open_surfaces.faces_skin": lambda r: expect(np.asarray(open_surfaces.faces_skin(surface(r), PART)), ()),
     "orientation.turn_toward_void": call_orientation,
+    "orientation.find_signs": lambda r: expect(orientation.find_signs(r.points, r.points, r.points[:, 0]), (r.count,)),
     "pieces.find_pieces": lambda r: expect(np.asarray(pieces.find_pieces(CUBE, r.points, r.numbers, 0.5)[1]), ()),
     "pieces.join_pieces": call_join_pieces,
     "point_pieces.number_pieces": lambda r: expect(point_pieces.number_pieces(r.points, 1.0), (r.count,)),
     "poisson.Grid": call_grid,
     "poisson.solve_poisson": call_poisson(poisson.solve_poisson),
     "poisson.solve_coarse_to_fine": call_poisson(poisson.solve_coarse_to_fine),
+    "polygons.triangulate_polygons": lambda r: expect(
+        polygons.triangulate_polygons(r.mesh.vertices, r.mesh.faces.ravel(), np.full(len(r.mesh.faces), 3)).faces,
+        (len(r.mesh.faces), 3),
+    ),
     "rays.RayCaster": call_rays,
+    "rays.measure_thickness": lambda r: expect(rays.measure_thickness(CUBE, r.points, r.normals) > 0, (r.count,)),
     "rays.prepare_rays": lambda r: expect(rays.prepare_rays(r.mesh).find_first(r.points, r.normals)[1], (r.count,)),
     "refinement.find_nearest": lambda r: expect(refinement.find_nearest(CUBE, r.points), (r.count,), (r.count, 3)),
     "refinement.refine_at": call_refine_at,
@@ -267,6 +287,13 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     ),
     "refinement.insert_points": call_insert_points,
     "sampling.sample_by_area": call_sampling,
+    "sheets.find_own_sheet": lambda r: expect(sheets.find_own_sheet(np.zeros((r.count, 9, 3))), (r.count, 9)),
+    "sheets.measure_spread": lambda r: expect(
+        sheets.measure_spread(np.zeros((r.count, 4, 3)), np.zeros((r.count, 4), bool)), (r.count, 3, 3)
+    ),
+    "sheets.query_own_sheet": lambda r: expect(
+        sheets.query_own_sheet(neighbourhoods.make_tree(r.points), r.points, r.points, 1)[1], (r.count, None)
+    ),
     "selectors.Selector": call_selector,
     "face_labels.carry_labels": lambda r: expect(
         face_labels.carry_labels(CUBE.vertices, CUBE.faces[: r.count], CUBE, np.arange(12)), (r.count,)
@@ -296,6 +323,8 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "transforms.move_mesh": lambda r: expect(transforms.move_mesh(r.mesh, np.eye(4)).faces, (len(r.mesh.faces), 3)),
     "transforms.remove_rigid": lambda r: expect(transforms.remove_rigid(r.points, r.points, r.ones), (r.count, 3)),
     "units.diagnose_scale": lambda r: units.diagnose_scale(r.points, CUBE.vertices) and None,
+    "units.describe_size": lambda r: units.describe_size(r.points, "mm") and None,
+    "units.question_size": lambda r: units.question_size(0.1, r.points, "mm") and None,
     "units.diagnose_size": lambda r: units.diagnose_size(r.points, "mm") and None,
     "vectors.measure_longest_edges": lambda r: expect(
         vectors.measure_longest_edges(r.mesh.triangles), (len(r.mesh.faces),)
@@ -324,7 +353,13 @@ WITHOUT_ROWS: dict[str, str] = {
     "transforms.turn_to_axis": "takes one vector",
     **dict.fromkeys(
         (
+            "alike.have_same_shape", "alike.measure_radii",
             "bodies.split_bodies", "bodies.split_shells", "rounding.round_to_single", "simplification.simplify_within",
+            "lost_depth.LostDepth",
+            "lost_depth.measure_lost_depth",
+            "shells.Shells", "shells.drop_unused_vertices", "shells.label_components", "shells.to_body",
+            "bubbles.find_bubbles", "bubbles.fill_bubbles", "near_faces.measure_shortfall",
+            "near_faces.name_nearest_skin",
             "skin.extract_ids", "skin.find_inner_faces", "touching.separate_touching", "remaining.subtract_from_part",
         ),
         "takes solids, which have at least four triangles",
@@ -342,13 +377,14 @@ WITHOUT_ROWS: dict[str, str] = {
             "open_surfaces.choose_cell", "selectors.Facing", "selectors.HalfSpace", "selectors.StrictMapping",
             "selectors.find_face", "threads.count_cores", "threads.count_threads", "threads.use_threads",
             "transforms.invert_pose",
-            "units.canonical_unit", "units.unit_factor",
+            "vectors.spread_directions", "units.canonical_unit", "units.unit_factor",
         ),
         "takes single values",
     ),
     **dict.fromkeys(
         (
             "distance.Closest", "families.Errors", "families.Family", "pieces.JoinedPieces", "pieces.Piece",
+            "polygons.PolygonTriangles",
             "pseudonormals.keep_signed_mesh", "rays.Crossings", "stiff_modes.StiffMode", "views.View",
         ),
         "is a result",

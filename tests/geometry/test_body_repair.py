@@ -19,7 +19,11 @@ BODIES = {
     "one of them inside out": (join(box(), invert(box(at=(30, 0, 0)))), 2000, "reversed the triangles of 1 of 2"),
     "overlapping": (join(box(), box(at=(5, 1, 1))), 2000 - 5 * 9 * 9, "united 2 bodies"),
     "face to face": (join(box(), box(at=(10, 0, 0))), 2000, "united 2 bodies"),
-    "one in the other": (join(box(), box(4)), 1000, "united 2 bodies"),
+    "one in the other": (join(box(), box(4)), 1000 - 64, "taken for a cavity"),
+    "overlapping, one of them inside out": (join(box(), invert(box(at=(5, 1, 1)))), 2000 - 5 * 9 * 9, "of 1 of 2"),
+    "face to face, one of them inside out": (join(invert(box()), box(at=(10, 0, 0))), 2000, "of 1 of 2"),
+    "the same twice, once inside out": (join(box(), invert(box())), 1000, "of 1 of 2"),
+    "a pocket of its own shell": (join(box(), invert(box(4, at=(3, 0, 0)))), 1000 - 64, "united 2 bodies"),
     "a cavity": (join(box(), invert(box(4))), 1000 - 64, "1 inner cavity, kept"),
     "a cavity, all inside out": (join(invert(box()), box(4)), 1000 - 64, "reversed all triangles"),
     "an island in a cavity": (join(box(), invert(box(6)), box(2)), 1000 - 216 + 8, "1 inner cavity, kept"),
@@ -35,6 +39,11 @@ def test_bodies_become_one_solid_and_notes_say_how(name: str, away: np.ndarray) 
     made = Solid(*resolve_bodies(vertices + away, faces, notes))
     assert made.volume == pytest.approx(volume)
     assert any(note in text for text in notes), notes
+
+
+def test_a_body_within_a_body_of_a_cad_kernel_is_no_cavity() -> None:
+    assert Solid(*resolve_bodies(*join(box(), box(4)), [], outward=True)).volume == pytest.approx(1000)
+    assert Solid(*resolve_bodies(*join(box(), invert(box(4))), [], outward=True)).volume == pytest.approx(936)
 
 
 def test_bodies_that_are_all_flat_are_refused() -> None:

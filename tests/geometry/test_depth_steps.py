@@ -63,3 +63,20 @@ def test_few_points_and_points_that_are_not_finite() -> None:
     assert measure_depth_step(np.zeros((10, 3))) == 0
     assert measure_depth_step(np.zeros((2000, 3))) == 0
     assert measure_depth_step(np.full((2000, 3), np.nan)) == 0
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.01])
+def test_a_mesh_whose_vertices_stand_in_rows_has_none(noise: float) -> None:
+    """Its walls have few heights, and its edges deviate from a plane as terraces do."""
+    pitch, size, sides = 1.25, np.array([70.0, 40.0, 20.0]), []
+    for axis in range(3):
+        a, b = (k for k in range(3) if k != axis)
+        rows = np.stack(np.meshgrid(*(np.arange(0, size[k] + pitch / 2, pitch) for k in (a, b))), -1).reshape(-1, 2)
+        for end in (0.0, size[axis]):
+            side = np.full((len(rows), 3), end)
+            side[:, (a, b)] = rows
+            side[:, axis] += noise * np.random.default_rng(axis).normal(size=len(rows))
+            sides.append(side)
+    points = np.concatenate(sides)
+    assert measure_depth_step(points) == 0
+    assert measure_depth_step((points @ TURN.T).astype(np.float32)) == 0

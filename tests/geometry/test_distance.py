@@ -90,6 +90,7 @@ def test_doubled_vertices_do_not_turn_the_sign() -> None:
     assert np.array_equal(distance < 0, inside)
 
 
+@pytest.mark.slow
 def test_sign_beside_the_short_edges_of_slender_triangles() -> None:
     """Round a bore with a cross hole, where long strips end on the hole's edge: the sign is that of the winding."""
     from damageest_evaluate.parts import PARTS

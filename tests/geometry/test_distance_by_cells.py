@@ -22,6 +22,7 @@ def around(part: Part, count: int, noise: float) -> Floats:
     return points
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("name", ["block", "gear", "half_torus", "tube", "blade"])
 def test_distances_are_right_within_a_hundredth_of_them_and_exact_far_off(name: str) -> None:
     part = PARTS[name]()

@@ -76,6 +76,7 @@ def check_rows(name: str, kinds: Iterable[tuple[float, bool, int]]) -> None:
         assert not refusal or re.search(expected, str(refusal)), told
 
 
+@pytest.mark.variants(25)
 @pytest.mark.parametrize("name", CALLS)
 def test_few_rows_have_an_answer_or_a_refusal_in_words(name: str) -> None:
     check_rows(name, KINDS)

@@ -29,6 +29,7 @@ def off(points: np.ndarray, radius: float) -> np.ndarray:
     return np.linalg.norm(points - [0, 0, -radius], axis=1) - radius
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("radius", [np.inf, 20.0, 8.0])
 def test_averaging_takes_off_noise_and_adds_no_bias(radius: float) -> None:
     points = cloud(radius)
@@ -40,6 +41,7 @@ def test_averaging_takes_off_noise_and_adds_no_bias(radius: float) -> None:
     assert abs(error.mean()) < 0.05 * SIGMA
 
 
+@pytest.mark.slow
 def test_a_sharp_edge_stays() -> None:
     rng = np.random.default_rng(5)
     flat = rng.uniform(-5, 5, (10_000, 2))

@@ -13,6 +13,7 @@ from damageest.geometry.neighbourhoods import (
     find_neighbours,
     measure_local_areas,
     pick_one_per_cube,
+    query_at_few,
     thin_points,
 )
 from damageest.geometry.sampling import sample_by_area
@@ -90,3 +91,14 @@ def test_the_areas_of_points_add_up_to_the_surface() -> None:
     with_outlier = measure_local_areas(np.vstack([points, [[1000.0, 0, 0]]]))
     assert with_outlier[-1] == pytest.approx(4 * np.median(with_outlier))
     assert measure_local_areas(points[:2]).tolist() == [1e-12, 1e-12]
+
+
+@pytest.mark.parametrize("count", [3000, 150_000])
+def test_the_nearest_points_of_a_few_places(count: int) -> None:
+    rng = np.random.default_rng(6)
+    points = rng.uniform(0, 50, (count, 3)) + FAR
+    places = points[:40]
+    distance, near = query_at_few(points, places, 8, rng)
+    expected, index = find_neighbours(places, 8, points)
+    assert np.allclose(distance, expected)
+    assert np.allclose(near + places[0], points[index])

@@ -55,6 +55,7 @@ def test_damage_outliers_and_clutter_do_not_inflate_the_noise():
     assert measure_noise_and_spacing(points)[0] == pytest.approx(0.05, rel=0.1)
 
 
+@pytest.mark.slow
 def test_dense_scans_are_measured_over_patches_wider_than_the_noise():
     rng = np.random.default_rng(0)
     flat = np.column_stack([rng.uniform(0, 10, (100_000, 2)), rng.normal(size=100_000) * 0.1])  # spacing 0.03

@@ -51,6 +51,7 @@ def test_points_come_onto_the_surface_with_normals_toward_the_skin() -> None:
     assert (np.einsum("ij,ij->i", normals, -out / radius[:, None]) > 0.95).all()
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("away", [0.0, 1e5])
 @pytest.mark.parametrize("turned", [False, True])
 def test_only_the_piece_at_the_points_inside_the_part_is_left(turned: bool, away: float) -> None:

@@ -50,6 +50,7 @@ def _as_arrays(mesh: trimesh.Trimesh) -> tuple[np.ndarray, np.ndarray]:
     return np.asarray(mesh.vertices), np.asarray(mesh.faces)
 
 
+@pytest.mark.slow
 def test_far_points_keep_their_side_where_a_mesh_crosses_itself_at_a_fold() -> None:
     """Damage volumes do so in a few places. Of these points 283 had the wrong side, and some 4 mm from a gear."""
     ball = trimesh.creation.icosphere(3)

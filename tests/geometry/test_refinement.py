@@ -12,6 +12,7 @@ from damageest.artefacts import Mesh, open_edges
 from damageest.geometry.refinement import bisect_faces, find_nearest, halve_edges, insert_points, refine_at
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(st.integers(0, 10_000), st.floats(0.05, 20))
 def test_refining_and_putting_points_in_keeps_the_shape(seed: int, edge: float) -> None:

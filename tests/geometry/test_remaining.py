@@ -40,6 +40,7 @@ def take(shape: trimesh.Trimesh, centre: Floats, radius: float) -> tuple[Part, S
     return part, found
 
 
+@pytest.mark.slow
 @settings(max_examples=25, deadline=None)
 @given(
     turn=st.floats(0, 6), tilt=st.floats(0.05, 3), radius=st.floats(0.8, 2.5), at=st.floats(-0.4, 0.4),
@@ -81,6 +82,7 @@ def test_lifted_faces_stand_off_and_the_mesh_stays_closed(seed: int, height: flo
     assert kept <= {tuple(face) for face in made.faces.tolist()}
 
 
+@pytest.mark.slow
 def test_nothing_covers_the_opening_of_a_prepared_cavity() -> None:
     """The faces of a cavity that is opened for deposition are many times smaller than those of the part."""
     shape = trimesh.creation.cylinder(radius=18, height=120, sections=96)
@@ -102,6 +104,7 @@ def test_nothing_covers_the_opening_of_a_prepared_cavity() -> None:
     assert find_covered(part, deposit.cavity, left) < 0.002
 
 
+@pytest.mark.slow
 def test_a_run_leaves_no_skin_over_the_opening() -> None:
     shape = trimesh.creation.cylinder(radius=10, height=40, sections=96)
     job = {

@@ -32,6 +32,7 @@ def test_far_away_the_field_goes_on_without_growing() -> None:
     assert np.linalg.norm(undo(make_field(0.1), points) - points, axis=1).max() < 3
 
 
+@pytest.mark.slow
 def test_a_field_that_folds_has_no_inverse() -> None:
     places = np.random.default_rng(1).uniform(LOW, HIGH, (500, 3))
     with pytest.raises(ArithmeticError, match="folds"):

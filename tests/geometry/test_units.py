@@ -10,7 +10,16 @@ from hypothesis import strategies as st
 from pydantic import BaseModel, ValidationError
 
 from damageest.errors import InputError
-from damageest.geometry.units import MILLIMETRES, UnitOption, canonical_unit, diagnose_scale, diagnose_size, unit_factor
+from damageest.geometry.units import (
+    MILLIMETRES,
+    UnitOption,
+    canonical_unit,
+    describe_size,
+    diagnose_scale,
+    diagnose_size,
+    question_size,
+    unit_factor,
+)
 
 units = st.sampled_from(sorted(MILLIMETRES))
 
@@ -122,3 +131,14 @@ def test_a_part_of_doubtful_size():
     assert said.startswith("the part is 0.08 mm across; is `units: mm` right?")
     assert diagnose_size(block, "um") is None
     assert "8000 m across" in str(diagnose_size(100 * block, "m"))
+
+
+def test_a_part_that_is_tiny_for_its_tolerance_is_questioned():
+    block = PARTS["block"].vertices
+    across = np.ptp(block, axis=0)
+    assert describe_size(block, "mm") == " x ".join(f"{length:.3g}" for length in across) + " mm"
+    assert question_size(0.15, block, "mm") is None
+    said = question_size(0.15, block / 25.4, "mm")  # inches, in a job in millimetres
+    assert said is not None
+    assert "is `units: mm` right" in said
+    assert describe_size(block / 25.4, "mm") in said

@@ -21,6 +21,7 @@ BY_HAND = re.compile(
 SIZES = st.floats(-1e6, 1e6, allow_subnormal=False).filter(lambda value: value == 0 or abs(value) > 1e-6)
 
 
+@pytest.mark.slow
 @given(arrays(np.float64, (5, 2, 3), elements=SIZES))
 def test_rows_have_length_1_and_their_direction(vectors: np.ndarray) -> None:
     found, length = normalise(vectors), np.linalg.norm(vectors, axis=-1)
@@ -44,6 +45,7 @@ def test_nobody_normalises_rows_by_hand(folder: str) -> None:
     assert {name: hits for name, hits in found.items() if hits and name not in own} == {}
 
 
+@pytest.mark.slow
 @given(arrays(np.float64, (4, 3, 3), elements=SIZES))
 def test_the_longest_edge_is_the_largest_distance_of_two_corners(triangles: np.ndarray) -> None:
     wanted = [max(np.linalg.norm(a - b) for a in one for b in one) for one in triangles]

@@ -105,6 +105,7 @@ def test_the_record_has_the_life_of_the_repair_and_is_sealed(repair: Repair) -> 
         read_record(other)
 
 
+@pytest.mark.slow
 def test_a_good_part_after_milling_is_met_and_appended(repair: Repair) -> None:
     write_scan(to_manifold(repair.aim.nominal), repair.folder / "milled.ply", COARSE)
     done = inspect(repair.folder, "milled.ply", "milled")
@@ -116,6 +117,7 @@ def test_a_good_part_after_milling_is_met_and_appended(repair: Repair) -> None:
     assert not second["findings"]
 
 
+@pytest.mark.slow
 def test_a_repair_that_the_scan_does_not_show_is_not_met(repair: Repair) -> None:
     points = scan_mesh(repair.aim.nominal, 0.7, 0.03)
     hidden = (points[:, 2] > 9) & (points[:, 0] > 1) & (points[:, 0] < 9) & (abs(points[:, 1]) < 9)

@@ -122,6 +122,7 @@ def test_a_run_gives_the_same_with_and_without_what_is_kept(folder: Path) -> Non
         assert [len(site.damage.faces) for site in without.sites] == [len(site.damage.faces) for site in other.sites]
 
 
+@pytest.mark.slow
 def test_what_is_kept_of_a_part_is_what_was_computed(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """All that an alignment takes from it: the grid of planes and the table of pairs."""
     monkeypatch.setattr(_prepare_part, "SURFACE_POINTS", 2000)

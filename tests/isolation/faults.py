@@ -25,6 +25,17 @@ def tell_process() -> int:
     return os.getpid()
 
 
+def work_in_parts(seconds: float, limit: float) -> None:
+    """Part after part, without end."""
+    number = 0
+    while number >= 0:
+        number += 1
+        with at_work(f"part {number}", limit):
+            end = time.process_time() + seconds
+            while time.process_time() < end:
+                pass
+
+
 def crash() -> None:
     ctypes.string_at(0)
 

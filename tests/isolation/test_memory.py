@@ -110,7 +110,7 @@ def cells():
     label = np.where(away < -0.01, DAMAGE, INTACT).astype(np.uint8)
     aligned = Scan(points * (1 + away)[:, None], noise=0.001, spacing=0.01)
     deviation, sites = Deviation(away, np.zeros(len(points), np.int64), label), Sites((label == DAMAGE).astype(int), 1)
-    return lambda: octree.Octree(cell=0.015).run(to, aligned, deviation, sites, None, 0.015)
+    return lambda: octree.Octree(cell=0.015).run(to, aligned, deviation, sites, 0.015)
 
 trim = ctypes.CDLL("libc.so.6").malloc_trim
 for make in [globals()[name] for name in sys.argv[1:]]:
@@ -132,6 +132,7 @@ WHAT = (
 )  # fmt: skip
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", [SOME, pytest.param(WHAT, marks=pytest.mark.slow)])
 def test_an_estimate_is_right_within_a_factor_of_two(what: tuple[str, ...]) -> None:
     done = subprocess.run([sys.executable, "-c", SCRIPT, *what], capture_output=True, text=True)

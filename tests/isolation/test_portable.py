@@ -78,6 +78,7 @@ print("done")
 """
 
 
+@pytest.mark.slow
 def test_isolated_calls_give_values_and_their_faults_are_errors(tmp_path: Path) -> None:
     done = run(tmp_path, FAULTS)
     assert done.stdout.splitlines()[-1:] == ["done"], done.stdout + done.stderr

@@ -101,6 +101,7 @@ FAULTS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("function", FAULTS, ids=lambda function: function.__name__)
 def test_faults_are_errors(function: Callable[..., Any]) -> None:
     with pytest.raises(StageError, match=FAULTS[function]) as caught:
@@ -156,6 +157,7 @@ def test_what_is_noted_has_a_time_limit_of_its_own() -> None:
     assert (caught.value.why, find_place(caught.value)) == ("time", "waiting")
 
 
+@pytest.mark.slow
 def test_a_limit_of_processor_time_counts_no_waiting() -> None:
     def measure(function: Callable[..., Any], **arguments: Any) -> Any:
         return call_isolated(function, arguments, worker="tests", processor_time=True)
@@ -167,6 +169,20 @@ def test_a_limit_of_processor_time_counts_no_waiting() -> None:
     with pytest.raises(ProcessError) as caught:  # but what waits for ever is ended too
         measure(faults.wait_at_work, seconds=60, limit=0.05)
     assert find_place(caught.value) == "waiting"
+
+
+def test_a_limit_of_processor_time_holds_for_a_whole_call_of_many_parts() -> None:
+    """Each part begins anew, and has time enough; what the call has used is told, and what it did is seen."""
+    used: list[float] = []
+    seen: set[str] = set()
+    with pytest.raises(ProcessError) as caught:
+        call_isolated(
+            faults.work_in_parts, {"seconds": 0.2, "limit": 5.0}, worker="tests", processor_time=True,
+            limits=Limits(seconds=0.6), tell=lambda usage: used.append(usage.seconds), watch=seen.add,
+        )  # fmt: skip
+    assert caught.value.why == "time"
+    assert 0.6 < used[0] < 2
+    assert any(what.startswith("part ") for what in seen)
 
 
 def test_a_process_for_one_call_ends_with_it() -> None:
@@ -272,6 +288,7 @@ def test_sizes_that_are_none(text: str) -> None:
         parse_memory(text)
 
 
+@pytest.mark.slow
 def test_free_memory() -> None:
     assert 0 < measure_free_memory() < 2**50
     assert format_bytes(6e9) == "6 GB"

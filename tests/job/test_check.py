@@ -56,7 +56,7 @@ def test_yaml_1_2_numbers_and_words(job_file: JobFile, registry: Registry) -> No
 def test_options_without_a_name_are_the_routes_own(job_file: JobFile, registry: Registry) -> None:
     assert EncloseAll in load(job_file("enclose: {screening: 2}\n"), registry).stages
     surface = load(job_file("method: surface\nenclose: {overhang: 2}\n"), registry)
-    assert surface.stages[Enclose].use == "adaptive"
+    assert surface.stages[Enclose].use == "divide"
     assert load(job_file("boundary: all_loops\nenclose: {overhang: 2}\n"), registry).method == "surface"
     octree = load(job_file("method: octree\nenclose: {depth: 7}\n"), registry)
     assert octree.stages[EncloseAll].model_dump()["depth"] == 7
@@ -179,6 +179,7 @@ def test_any_mapping_is_sound_or_a_job_error(tree: dict[str, object], registry: 
         load(tree, registry)
 
 
+@pytest.mark.slow
 @settings(max_examples=100, deadline=None)
 @given(_VALUES)
 def test_written_yaml_reads_back_the_same(value: object) -> None:

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 from damageest.job.reference import COMMAND, write_reference
 from damageest.registry import Registry
 from tests.job.test_schema import own
@@ -21,6 +23,7 @@ def test_the_job_reference_is_current(registry: Registry) -> None:
     assert PAGE.read_text() == current, f"run: {COMMAND}"
 
 
+@pytest.mark.slow
 def test_the_command_of_the_job_reference_writes_it() -> None:
     done = subprocess.run([sys.executable, "-m", "damageest.job.reference"], capture_output=True, text=True, check=True)
     assert done.stdout.startswith("<!-- Generated; do not edit.")

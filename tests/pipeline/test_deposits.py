@@ -14,12 +14,12 @@ import trimesh
 from manifold3d import Manifold
 
 import damageest
-from damageest.artefacts import Deposit, Solid
+from damageest.artefacts import Deposit, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import iou, to_arrays, to_manifold
 from damageest.job import Job
 from damageest.output.result_json import build_report, result_schema
-from damageest.pipeline.deposits import make_deposits, separate_deposits
+from damageest.pipeline.deposits import make_deposits, refuse_bubbles, separate_deposits
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.registry import Registry
@@ -75,6 +75,7 @@ def test_the_report_has_the_figures(folder: Path) -> None:
     assert site["files"]["deposit"] == "deposit/site-1.stl"
 
 
+@pytest.mark.slow
 def test_another_outer_runs_allowance_and_export_alone(copied: Path, registry: Registry) -> None:
     result = damageest.run(copied, output=True, settings=["allowance.outer=1.5"], registry=registry)
     assert [record.stage for record in result.stages if not record.cached] == ["allowance", "export", "report"]
@@ -94,6 +95,7 @@ def test_the_written_job_says_the_same(folder: Path) -> None:
     assert first.sites[0].deposit.vertices.tobytes() == second.sites[0].deposit.vertices.tobytes()
 
 
+@pytest.mark.slow
 def test_a_cut_back_enlarges_the_cavity_and_not_the_damage_that_was_found(
     ran: tuple[Path, Result], copied: Path, registry: Registry
 ) -> None:
@@ -109,6 +111,7 @@ def test_a_cut_back_enlarges_the_cavity_and_not_the_damage_that_was_found(
     assert build_report(cut)["material"]["cut_back_volume"] == after.deposit.cut_back_volume
 
 
+@pytest.mark.slow
 def test_a_refused_site_keeps_its_damage(copied: Path, registry: Registry) -> None:
     box = "[[-9, -9, 5], [9, 9, 15]]"
     settings = [f"allowance.keep_out=[{{box: {box}}}]"]
@@ -223,3 +226,18 @@ def test_milling_is_registered_with_its_provider() -> None:
     item = Registry.discover().get("allowance", "milling")
     assert item.cls is Milling
     assert item.provider.name == "damageest"
+
+
+def test_a_deposit_of_any_implementation_with_a_bubble_is_refused() -> None:
+    """A hollow stock on a block; a cavity that metal fills, or that the part was designed with, is none."""
+    block, lost = Manifold.cube((20, 20, 10)), Manifold.cube((6, 6, 4)).translate((7, 7, 6))
+    ball = Manifold.sphere(1, 24)
+    full = Manifold.cube((6, 6, 7)).translate((7, 7, 6))
+    part, damage = Part(*to_arrays(block)), Solid(*to_arrays(lost))
+    hollow = Solid(*to_arrays(full - ball.translate((10, 10, 11.5))))
+    with pytest.raises(StageError, match=r"encloses an empty space of 4.* in volume, near \(10, 10, 11.5\)"):
+        refuse_bubbles(hollow, damage, part)
+    refuse_bubbles(Solid(*to_arrays(full)), damage, part)
+    island = ball.translate((10, 10, 8))
+    refuse_bubbles(Solid(*to_arrays(full - island)), Solid(*to_arrays(lost - island)), part)
+    refuse_bubbles(Solid(*to_arrays(full - island)), Solid(*to_arrays(lost - island)), Part(*to_arrays(block - island)))

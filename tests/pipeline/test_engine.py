@@ -143,6 +143,7 @@ class Noisy:
             raise RuntimeError("no disk for my log")
 
 
+@pytest.mark.slow
 def test_an_observer_that_fails_does_not_stop_the_run(small_done: Path, small_result: Result) -> None:
     with pytest.warns(RuntimeWarning, match="no disk for my log"):
         watched = damageest.run(small_done, registry=Registry.discover([Noisy()]), output=True)
@@ -150,6 +151,7 @@ def test_an_observer_that_fails_does_not_stop_the_run(small_done: Path, small_re
     assert watched.damage_volume == small_result.damage_volume
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("setting", "are_taken"), [("sample=uniform", False), ("segment=cloud_distance", True)])
 def test_points_on_all_of_the_skin_are_made_only_where_a_stage_takes_them(
     setting: str, are_taken: bool, small_done: Path, registry: Registry
@@ -173,6 +175,7 @@ def test_only_what_changed_runs_again(small_done: Path, small_result: Result, re
     assert again.scan.points.shape == (2000, 3)
 
 
+@pytest.mark.slow
 def test_other_options_of_a_stage_run_it_again_and_nothing_before(small_done: Path, registry: Registry) -> None:
     nearby = damageest.run(small_done, output=True, registry=registry, settings=["cluster.neighbours=11"])
     cached = {record.stage for record in nearby.stages if record.cached}

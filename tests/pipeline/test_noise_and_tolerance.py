@@ -18,6 +18,7 @@ from damageest.stages.scan.simulate import Simulate
 from tests.pipeline.halfway import run_until
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pose", ["known", pytest.param("unknown", marks=pytest.mark.slow)])
 def test_noise_of_three_tolerances_is_refused_with_the_tolerance_to_give(pose: str) -> None:
     """Before a pose is looked for: noise as it is measured without one."""
@@ -28,6 +29,7 @@ def test_noise_of_three_tolerances_is_refused_with_the_tolerance_to_give(pose: s
         damageest.run({"version": 1}, part=part, scan=scan, settings=settings)
 
 
+@pytest.mark.slow
 def test_noise_of_less_than_two_tolerances_is_refused_in_the_pose() -> None:
     part = PARTS["lever"]()
     scan = Simulate(points=15_000, noise=0.6, pose="identity", seed=3).run("mm", part)

@@ -36,6 +36,7 @@ ROUTE = ["part", "scan", "align", "segment", "cluster", "enclose", "boolean", "a
 SETTINGS = ["cluster.neighbours=9", "tolerance=0.6"]
 
 
+@pytest.mark.variants(slow=4)
 @pytest.mark.slow
 @pytest.mark.parametrize("stage", ROUTE)
 def test_killed_in(stage: str, small_done: Path, registry: Registry) -> None:
@@ -45,6 +46,7 @@ def test_killed_in(stage: str, small_done: Path, registry: Registry) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_killed_after_the_scan_was_read(small_done: Path, registry: Registry) -> None:
     """Before any stage has run threads, so that a fork can stand for the process that the others start."""
@@ -85,6 +87,7 @@ def check_killed(job: Path, place: int, registry: Registry, run: Callable[[], in
     assert [p.name for p in out.parent.iterdir()] == ["job"], "nothing is left lying about"
 
 
+@pytest.mark.slow
 def test_another_format_runs_the_export_alone(small_done: Path, registry: Registry) -> None:
     result = damageest.run(small_done, output=True, settings=["export.format=ply"], registry=registry)
     assert [r.stage for r in result.stages if not r.cached] == ["export", "report"]
@@ -95,6 +98,7 @@ def test_only_what_depends_on_a_change_runs_again(small_done: Path, registry: Re
     assert not {r.stage for r in result.stages if not r.cached} & {"part", "scan", "align", "segment", "cluster"}
 
 
+@pytest.mark.slow
 def test_what_is_not_ours_stays(small_done: Path, registry: Registry) -> None:
     notes = small_done.parent / "out/job/notes.txt"
     notes.write_text("mine")
@@ -104,6 +108,7 @@ def test_what_is_not_ours_stays(small_done: Path, registry: Registry) -> None:
         damageest.run(small_done, output=small_done.parent, registry=registry)
 
 
+@pytest.mark.slow
 def test_a_damaged_cache_is_computed_anew(small_done: Path, small_result: Result, registry: Registry) -> None:
     for file in (small_done.parent / "out/job/stages").glob("segment-*"):
         file.write_bytes(b"\x00garbage")

@@ -97,6 +97,7 @@ DATUMS = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("align", "source", "offset", "scale"),
     [
@@ -129,6 +130,7 @@ def find_depth(site: Site) -> float:
     return site.depth_95[0] + site.uncertainty.depth_budget.expanded
 
 
+@pytest.mark.slow
 def test_a_warm_part_is_brought_to_20_degrees(plain: Halfway) -> None:
     scale = 1 + WARM["expansion"] * (WARM["part"] - 20)
     right = plain.finish().damage_volume
@@ -138,6 +140,7 @@ def test_a_warm_part_is_brought_to_20_degrees(plain: Halfway) -> None:
     assert {row.source for row in warm.budget.rows} >= {"temperature", "expansion"}  # type: ignore[union-attr]
 
 
+@pytest.mark.slow
 def test_a_wrong_scale_is_named(registry: Registry) -> None:
     told = {"certificate": {"length": 0.005, "k": 2}}
     cold = run_until_weighed(registry, 1.004, "measure_uncertainty", scanner=told)
@@ -177,6 +180,7 @@ def test_a_certificate_widens_the_interval_and_the_interval_is_twice_the_budget(
 CERTIFIED = "scanner:\n  certificate: {probing_form: 0.2, length: 0.01 + L/5000}\n"
 
 
+@pytest.mark.slow
 def test_result_json_and_the_table_have_the_budget(small_done: Path) -> None:
     small_done.write_text(small_done.read_text() + CERTIFIED)
     done = CliRunner().invoke(app, ["run", str(small_done)])

@@ -39,8 +39,8 @@ def write_job(folder: Path, where: str, part: str = "box.stl") -> Path:
         ("facing: {direction: [0, 0, 1], angle: 5}", ""),
         ("box: [[-20, -15, 9.9], [20, 15, 11]]", ""),
         ("box: [[1, 1, 10], [2, 2, 10.5]]", ""),  # smaller than the triangle that it lies on
-        ("box: [[1, 1, 1], [2, 2, 2]]", NO_SKIN + "box"),
-        ("box: [[500, 0, 0], [600, 10, 10]]", NO_SKIN + "box"),
+        ("box: [[1, 1, 1], [2, 2, 2]]", NO_SKIN + "box: the nearest skin is at (1.5, 1.5, 10)"),
+        ("box: [[500, 0, 0], [600, 10, 10]]", NO_SKIN + "box: the nearest skin is at (20, 5, 5)"),
         ("facing: {direction: [1, 1, 1], angle: 20}", NO_SKIN + "facing"),
         (
             "half_space: {point: [0, 0, 9], normal: [0, 0, 1]}, facing: {direction: [0, 0, -1]}",
@@ -73,7 +73,7 @@ def test_skin_to_keep_free_and_datums_are_checked_too(tmp_path: Path) -> None:
     assert status == 2
     assert "allowance.keep_out.1: " + NO_SKIN + "facing" in text
     assert "align.datum.0: " + NO_SKIN + "box" in text
-    assert "keep_out.0" not in text  # a solid, not skin
+    assert "allowance.keep_out.0: this solid is 70 from the box of the part, x -20 to 20" in text
 
 
 def test_names_are_checked_in_a_part_from_python(tmp_path: Path) -> None:
@@ -98,6 +98,7 @@ def pocket(tmp_path_factory: pytest.TempPathFactory) -> Path:
         ("faces: [pocket_flor]", "no CAD face 'pocket_flor' (did you mean 'pocket_floor'?); give one of the names"),
         ("faces: [99]", "the part has no CAD face 99; give a number from 0 to 12"),
         ("faces: [pocket_floor], kind: cylinder", NO_SKIN + "faces and kind"),
+        ("box: [[-5, -4, 4], [5, 4, 4.5]]", NO_SKIN + "box: the nearest CAD faces are "),
     ],
 )
 def test_faces_of_a_step_file(pocket: Path, tmp_path: Path, where: str, message: str) -> None:

@@ -53,6 +53,7 @@ def test_a_loss_under_a_bead_is_right_where_it_is_seen_and_named() -> None:
     assert "covered" in [reason.code for reason in site.verdict.reasons]
 
 
+@pytest.mark.slow
 def test_a_bead_is_right_and_no_loss(registry: Registry) -> None:
     actual = block() + slab((8, 10, 2), 3, 0, 6)
     points = Scan(scan(actual, 12_000))
@@ -67,6 +68,7 @@ def test_a_bead_is_right_and_no_loss(registry: Registry) -> None:
     assert (state.deviation.label[bead.points] == ADDED).all()
 
 
+@pytest.mark.slow
 def test_without_added_metal_there_is_no_surplus() -> None:
     assert run(scan(block() - ball(3, 0, 0, 7), 5000)).surplus == ()
 

@@ -71,6 +71,7 @@ def dent_and_strays(registry: Registry) -> Halfway:
     return run_until("choose_sites", box(), scan, registry, tolerance=TOLERANCE, align="none")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [pytest.param(4, marks=pytest.mark.slow), 16])
 def test_a_few_stray_points_are_no_failure(count: int, registry: Registry) -> None:
     result = run(scan_with_strays(count), registry)
@@ -87,6 +88,7 @@ def test_a_few_stray_points_beside_a_dent_are_no_failure(count: int, registry: R
     assert beside.damage_volume == pytest.approx(2 / 3 * np.pi * 4**3, rel=0.03)
 
 
+@pytest.mark.slow
 def test_stray_points_under_intact_ones_are_doubtful_and_no_damage_unless_accepted(dent_and_strays: Halfway) -> None:
     result = dent_and_strays.finish()
     assert result.status == "ok"
@@ -130,6 +132,7 @@ def test_files_of_doubtful_sites_lie_apart_and_a_run_with_no_other_ends_with_1(d
     assert report["damage_volume"] == report["material"]["deposit_volume"] == 0
 
 
+@pytest.mark.slow
 def test_files_of_doubtful_sites_go_where_they_are_accepted(doubted: tuple[Path, Answer], tmp_path: Path) -> None:
     shutil.copytree(doubted[0].parent, tmp_path, dirs_exist_ok=True)
     job, out = tmp_path / "job.yaml", tmp_path / "out" / "job"

@@ -98,6 +98,7 @@ def end_after(moves: int) -> None:
     os.replace = count  # type: ignore[assignment]
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="needs fork")
 def test_killed_at_any_move_while_the_content_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The next run finds the earlier output or the new one, whole, and the user's files."""

@@ -65,6 +65,7 @@ def test_a_conversion_says_which_package_it_needs(kind: str, bare: Registry) -> 
         bare.conversions[kind](None, "damage", 1)  # type: ignore[arg-type]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=pytest.mark.slow if k else ()) for k, name in enumerate(bundled.COMMANDS)]
 )

@@ -22,6 +22,7 @@ def damageest_conversions():
 """
 
 
+@pytest.mark.slow
 def test_a_plugins_conversion_is_called_with_the_result(site: Site, tiny_done: Path) -> None:  # noqa: F811
     site.add("acme-count", COUNTED.replace("NAME", "'count'"))
     result = damageest.run(tiny_done, output=True)

@@ -72,6 +72,7 @@ def test_one_package_that_provides_a_name_twice(site: Site) -> None:
         registry.get("allowance", "doubled")
 
 
+@pytest.mark.slow
 def test_a_stage_that_prints_leaves_json_alone(site: Site, tiny_done: Path) -> None:
     site.add("acme-loud", GROWN.replace(BODY, f"print('hello'); {BODY}"))
     done = CliRunner().invoke(app, ["run", "--json", str(tiny_done), "--set", "allowance=doubled"])
@@ -120,6 +121,7 @@ def damageest_stages():
 '''
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", MISBEHAVIOUR)
 def test_what_a_stage_does_wrong_is_said_with_whose_it_is(name: str, site: Site, tiny_done: Path) -> None:
     body, text = MISBEHAVIOUR[name]

@@ -160,6 +160,7 @@ def test_an_interrupt_of_a_stage_is_an_interrupt(site: Site, tmp_path: Path) -> 
         damageest.run(write(tmp_path, "align", "raise KeyboardInterrupt"))
 
 
+@pytest.mark.slow
 def test_the_second_job_runs_after_an_error_that_is_no_exception(site: Site, tmp_path: Path) -> None:
     site.add("acme-bad", STAGES)
     bad = write(tmp_path / "bad", "align", "raise GeneratorExit")
@@ -204,6 +205,7 @@ class Watcher:
 """
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("error", ["SystemExit", "RuntimeError"])
 def test_an_observer_that_raises_is_a_warning_whatever_it_raises(error: str, site: Site, tiny_done: Path) -> None:
     import importlib
@@ -227,6 +229,7 @@ LOUD = {
 }
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("name", LOUD)
 def test_what_a_plugin_says_is_cleaned_and_cut(name: str, site: Site, tmp_path: Path) -> None:
     site.add("acme-loud", STAGES)

@@ -81,6 +81,7 @@ def test_every_plugin_provides_something(plugin: str, registry: Registry) -> Non
     assert any(item.provider.name == name for item in registry.implementations) or load_commands().get(name) or formats
 
 
+@pytest.mark.slow
 def test_a_plugins_stage_runs(site: Site, tiny_done: Path) -> None:
     site.add("acme-grow", GROWN)
     assert any(str(p) == "acme-grow 1.2" and p.licence == "MIT" for p in Registry.discover().providers)
@@ -111,6 +112,7 @@ def test_a_broken_plugin_stops_nothing(source: str, site: Site, tiny_done: Path)
         damageest.run(tiny_done, settings=["allowance=doubled"], registry=registry)
 
 
+@pytest.mark.slow
 def test_a_clash_names_both(site: Site, tiny_done: Path) -> None:
     site.add("acme-one", GROWN)
     site.add("acme-two", GROWN)
@@ -153,6 +155,7 @@ class Observer:
         self.seen.append((type(error).__name__, stage))
 
 
+@pytest.mark.slow
 def test_observers_see_every_stage(tiny_done: Path) -> None:
     observer = Observer()
     result = damageest.run(tiny_done, registry=Registry.discover([observer]))

@@ -7,10 +7,15 @@ import tempfile
 from pathlib import Path
 
 import pytest
+from manifold3d import Manifold
 
 import damageest
-from damageest.errors import JobError
+from damageest.artefacts import Solid
+from damageest.cli.doctor import try_plugins
+from damageest.errors import JobError, StageError
+from damageest.geometry.solids import to_arrays
 from damageest.registry import Registry
+from damageest.stages.export import Body
 from tests import damaged_box
 from tests.registry.test_registry import Site, site  # noqa: F401 - a fixture
 
@@ -28,6 +33,7 @@ def damageest_writers():
 """
 
 
+@pytest.mark.slow
 def test_a_plugins_format_is_written_listed_and_cleared_away(site: Site, tiny_done: Path) -> None:  # noqa: F811
     site.add("acme-count", COUNTED.replace("NAME", "'count'"))
     text = tiny_done.read_text()
@@ -70,3 +76,43 @@ def test_a_broken_plugin_is_named_where_its_format_is_asked_for(site: Site) -> N
         JobError, match=r"no format 'acme'; there are: .*acme-fails 1\.2 is broken \(OSError: no licence"
     ):
         damageest.run(path)
+
+
+RUN_WRITER = """
+from damageest.stages.export import Writer, ExportedFiles
+
+def write(folder, stem, bodies, unit):
+    BODY
+
+@hookimpl
+def damageest_writers():
+    return {"acme": Writer(write)}
+"""
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return [stem + '.acme']", "gave a list, and has to give an ExportedFiles"),
+        ("return ExportedFiles((stem + '.acme',))", "says that it wrote box.acme, and there is no such file"),
+        ("return ExportedFiles(('/etc/box.acme',))", "has to give paths relative to its folder"),
+        ("open('/nowhere/licence.txt')", "failed: FileNotFoundError: [Errno 2] No such file or directory"),
+        ("bodies[0].colour.red", "failed: AttributeError: 'tuple' object has no attribute 'red'"),
+        ("raise SystemExit(4)", "failed: SystemExit: 4"),
+    ],
+)
+def test_a_faulty_writer_is_named_with_its_package_function_and_hook(
+    site: Site,  # noqa: F811
+    tmp_path: Path,
+    body: str,
+    message: str,
+) -> None:
+    site.add("acme-cad", RUN_WRITER.replace("BODY", body))
+    registry = Registry.discover()
+    box = Body("box", Solid(*to_arrays(Manifold.cube((1, 2, 3)))), (0, 0, 0))
+    with pytest.raises(StageError) as caught:
+        registry.writers["acme"].write(tmp_path, "box", [box], "mm")
+    assert "'acme' of acme-cad 1.2 (acme_cad.write, its `write`, from the hook damageest_writers)" in str(caught.value)
+    assert message in caught.value.message
+    assert "authors of acme-cad 1.2" in caught.value.remedy
+    assert [fault for fault in try_plugins(registry) if "acme-cad 1.2" in fault and message in fault]

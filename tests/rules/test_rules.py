@@ -57,7 +57,8 @@ def test_a_rule_gives_its_reason_and_no_other_rule_objects(code: str, case: dict
     for reason in found:
         assert reason.text
         assert (reason.effect == "open" and reason.amount is None) == case.get("open_end", False)
-    level = decide(site.volume, open_end(site.interval, found), found).level
+    assert site.uncertainty is not None
+    level = decide(site.volume, open_end(site.interval, found), found, site.uncertainty.certain).level
     expected = {None: "proven", "widens": "proven", "open": "likely", "contradicts": "doubtful"}[case["effect"]]
     assert level == case.get("level", expected)
 
@@ -123,9 +124,12 @@ class Plugin:
 
 def test_a_plugin_adds_a_rule_and_one_that_is_none_is_refused() -> None:
     from damageest.errors import PluginError
+    from damageest.registry.loading import Provider
     from damageest.registry.registry import _read_rules
 
-    assert set(_read_rules(Plugin(Rust), RULES)) == {"rust"}
+    acme = Provider("acme", "1", "MIT", "acme")
+
+    assert set(_read_rules(Plugin(Rust), RULES, acme)) == {"rust"}
     for wrong in (Rust(), int, type("Twice", (Rust,), {"code": "displaced"}), type("Mute", (Rust,), {"meaning": None})):
         with pytest.raises(PluginError):
-            _read_rules(Plugin(wrong), RULES)
+            _read_rules(Plugin(wrong), RULES, acme)

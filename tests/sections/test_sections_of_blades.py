@@ -54,6 +54,7 @@ def across_leading(points: Floats, z: float) -> Floats:
     return np.asarray(points[:, :2] @ [np.cos(angle), np.sin(angle)])
 
 
+@pytest.mark.slow
 def test_twist_and_bow_of_a_blade_of_the_right_form_are_measured(made: Floats) -> None:
     sections = cut(made, {"along": "axis", "count": 3})
     assert [section.kind for section in sections] == ["blade"] * 3
@@ -68,6 +69,7 @@ def test_twist_and_bow_of_a_blade_of_the_right_form_are_measured(made: Floats) -
     assert off(sections[1].value("bow from straight"), middle) < 0.01
 
 
+@pytest.mark.slow
 def test_a_shorter_and_thinner_section_is_not_taken_for_a_moved_one() -> None:
     flatter = 0.05 * 0.6 * 2 / 3  # by how much less the mean of the camber line is off the chord
     for section in cut(scan(WORN), {"along": "z", "count": 2}):
@@ -112,6 +114,7 @@ def test_a_place_that_was_not_scanned_and_a_plane_beside_the_part_are_said(made:
     assert "passes beside the part, 7 mm from it" in beside.notes[0]
 
 
+@pytest.mark.slow
 def test_one_side_alone_leaves_the_bow_as_unsure_as_the_thickness(made: Floats) -> None:
     points = made
     near = points[np.abs(points[:, 2] - 45) < 1]

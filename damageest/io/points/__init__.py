@@ -25,6 +25,7 @@ class PointFile:
 
     ``points`` (N,3), which may be not finite; ``normals`` (N,3) or None; ``unit`` if the file states one, else None.
     ``unit_said``: the line of the file that states it; empty where the standard of the format does.
+    ``columns``: which columns of a text file are x, y and z, and why; empty where it can only be the first three.
     ``colours`` (N,3), 0 to 255, or None; ``confidence`` (N,) of each point, on the file's own scale, or None.
     ``viewpoints`` (V,3): scanner positions in the frame of the points; ``view`` (N,): the number of each point's
     position, -1 where it is not known. Both None where the file has none.
@@ -39,6 +40,7 @@ class PointFile:
     colours: Bytes | None = None
     confidence: Singles | None = None
     unit_said: str = ""
+    columns: str = ""
 
     def take(self, keep: Flags) -> PointFile:
         """The file with some of its points: whether each (N,) is taken."""

@@ -11,11 +11,12 @@ from pathlib import Path
 
 import numpy as np
 
+from damageest.artefacts import Floats
 from damageest.geometry.duplicates import find_duplicates
-from damageest.io.meshes import read_mesh, read_stl_corners
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_unit, scale_colours
 from damageest.io.points.text import parse_numbers
+from damageest.io.triangles import read_stl_corners, read_triangles
 
 NOTE = "the file is a mesh; its vertices are used as the scan's points"
 
@@ -32,13 +33,21 @@ def _read_stl(path: Path) -> PointFile:
 
 
 def _read_3mf(path: Path) -> PointFile:
-    vertices, _, unit = read_mesh(path)
+    vertices, _, unit = read_triangles(path, ".3mf")
     return PointFile(vertices, unit=unit, unit_said=f"unit={unit}" if unit else "")
 
 
 def _read_obj(path: Path) -> PointFile:
     data = path.read_bytes()
     unit, said = find_unit([line.decode("latin-1").lstrip("#") for line in re.findall(rb"^#.*$", data[:4096], re.M)])
+    table = read_obj_vertices(data)
+    colours = scale_colours(table[:, 3:6]) if table.shape[1] in (6, 7) else None  # not a weight alone
+    return PointFile(table[:, :3], colours=colours, unit=unit, unit_said=said)
+
+
+def read_obj_vertices(data: bytes) -> Floats:
+    """The numbers (V,3 or more) of the vertices in the text of an OBJ file. Raises FormatError where it has none, or
+    they differ in number."""
     rows = re.findall(rb"^[ \t]*v[ \t]+([^\n#]*)", data, re.MULTILINE)
     if not rows:
         raise FormatError("the OBJ file has no vertices ('v x y z')")
@@ -46,29 +55,36 @@ def _read_obj(path: Path) -> PointFile:
     values = parse_numbers(b" ".join(rows))
     if width < 3 or len(values) != width * len(rows):
         raise FormatError("not all vertices have three coordinates; the file may be truncated")
-    table = values.reshape(-1, width)
-    colours = scale_colours(table[:, 3:6]) if width in (6, 7) else None  # not a weight alone
-    return PointFile(table[:, :3], colours=colours, unit=unit, unit_said=said)
+    return values.reshape(-1, width)
 
 
 def _read_off(path: Path) -> PointFile:
-    text = path.read_bytes()
-    unit, said = find_unit([line.decode("latin-1") for line in re.findall(rb"#([^\r\n]*)", text[:4096])])
-    data = re.sub(rb"#[^\n]*", b"", text).replace(b"\r", b"\n").strip()
-    start = re.match(rb"(ST)?(C)?(N)?OFF\s+(\d+)\s+(\d+)(\s+\d+)?[ \t]*\n", data)
-    if not start:
-        raise FormatError("not a text OFF file")
-    count = int(start.group(4))
-    lines = [line for line in data[start.end() :].split(b"\n") if line.strip()][:count]
-    if len(lines) < count:
-        raise FormatError(f"the OFF file is truncated: it has {len(lines)} of {count} vertices")
-    if not count:
-        return PointFile(np.empty((0, 3)))
-    values = parse_numbers(b"\n".join(lines))
-    if len(values) % count or len(values) < 3 * count:
-        raise FormatError("not all vertices have three coordinates")
-    table = values.reshape(count, -1)
-    coloured = bool(start.group(2)) and not start.group(1) and not start.group(3) and table.shape[1] >= 6
+    comments = re.findall(rb"#([^\r\n]*)", path.read_bytes()[:4096])
+    unit, said = find_unit([line.decode("latin-1") for line in comments])
+    table, _, _, mark = read_off_rows(path)
+    coloured = mark == "C" and table.shape[1] >= 6
     return PointFile(
         table[:, :3], colours=scale_colours(table[:, 3:6]) if coloured else None, unit=unit, unit_said=said
     )
+
+
+def read_off_rows(path: Path) -> tuple[Floats, list[bytes], int, str]:
+    """The numbers (V,3 or more) of the vertices of a text OFF file, the lines after them, of which the first are the
+    faces, how many these should be, and what the header says in front of OFF. Raises FormatError."""
+    data = path.read_bytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    data = re.sub(rb"#[^\n]*", b"", data).strip()
+    start = re.match(rb"(?:((?:ST)?C?N?)OFF\s+)?(\d+)\s+(\d+)(\s+\d+)?[ \t]*\n", data)
+    if not start:
+        first = data[:60].split(b"\n", 1)[0].decode("latin-1").strip()
+        raise FormatError(f"not a text OFF file of three coordinates: it begins with '{first}'")
+    count = int(start.group(2))
+    lines = [line for line in data[start.end() :].split(b"\n") if line.strip()]
+    if len(lines) < count:
+        raise FormatError(f"the OFF file is truncated: it has {len(lines)} of {count} vertices")
+    mark = (start.group(1) or b"").decode()
+    if not count:
+        return np.empty((0, 3)), lines, int(start.group(3)), mark
+    values = parse_numbers(b"\n".join(lines[:count]))
+    if len(values) % count or len(values) < 3 * count:
+        raise FormatError("not all vertices have three coordinates")
+    return values.reshape(count, -1), lines[count:], int(start.group(3)), mark

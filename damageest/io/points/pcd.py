@@ -59,8 +59,8 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         raise FormatError("the PCD header is incomplete or inconsistent") from None
     if not {"x", "y", "z"} <= set(names):
         raise FormatError(f"the PCD file has no fields x, y, z; it has: {', '.join(names)}")
-    if points < 0 or any(c < 1 for c in counts):
-        raise FormatError("the PCD header gives a negative number")
+    if points < 0 or any(count < (name in "xyz") for name, count in zip(names, counts, strict=True)):
+        raise FormatError("the PCD header gives a negative number, or no coordinates")
     if form == "ascii":
         table = _read_ascii(data[start:], points, sum(counts))
         offsets = dict(zip(names, np.cumsum([0, *counts[:-1]]).tolist(), strict=True))
@@ -169,6 +169,8 @@ def _read_compressed(data: bytes, start: int, points: int, kind: np.dtype[np.voi
     columns, at = {}, 0
     for name in kind.names or ():
         field = kind[name]
+        if not field.itemsize:
+            continue
         columns[name] = np.frombuffer(block, field.base, points * field.itemsize // field.base.itemsize, at).reshape(
             points, -1
         )[:, 0]

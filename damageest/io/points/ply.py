@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import mmap
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -16,105 +15,19 @@ from numpy.typing import NDArray
 
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_colours, find_confidence, find_unit, scale_colours
+from damageest.io.points.ply_header import Element, Header, read_header
+from damageest.io.points.ply_lists import skip_rows
 from damageest.io.points.text import parse_numbers
 
-TYPES = {
-    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
-    **{"float": "f4", "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2"},
-    **{"int32": "i4", "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8"},
-}
-LONGEST_HEADER = 1 << 20
-"""Bytes of a header at most."""
 ROWS = 1 << 20
 """Vertices of a block."""
+LINES = 100
+"""Lines of text that tell how many numbers a vertex has."""
 TEXT = 1 << 24
 """Bytes of text that are parsed at once."""
 
 Columns = Mapping[str, Any] | NDArray[np.void]
 """Columns (N,) of a block by the names of the properties."""
-
-
-@dataclass
-class Element:
-    """An element of the header: the properties (name, type), and its lists: the position among the properties, the type
-    of the count, and that of the items."""
-
-    name: str
-    count: int
-    properties: list[tuple[str, str]] = field(default_factory=list)
-    lists: list[tuple[int, str, str]] = field(default_factory=list)
-
-
-@dataclass(frozen=True)
-class Header:
-    """The name of the format, the elements, the comments, and the position of the first byte after the header."""
-
-    form: str
-    elements: list[Element]
-    comments: tuple[str, ...]
-    end: int
-
-    @property
-    def order(self) -> str:
-        """The byte order, as numpy names it."""
-        return ">" if self.form == "binary_big_endian" else "<"
-
-    @property
-    def vertex(self) -> Element:
-        """The element 'vertex'. Raises FormatError where there is none, or none with coordinates."""
-        vertex = next((one for one in self.elements if one.name == "vertex"), None)
-        if vertex is None:
-            raise FormatError("the PLY file has no element 'vertex'")
-        names = [name for name, _ in vertex.properties]
-        if not {"x", "y", "z"} <= set(names):
-            raise FormatError(
-                f"the vertices of the PLY file have no x, y, z; their properties are: {', '.join(names) or 'none'}"
-            )
-        if vertex.lists:
-            raise FormatError("the vertices of the PLY file have list properties, which are not supported")
-        return vertex
-
-    @property
-    def before(self) -> list[Element]:
-        """The elements in front of the vertices."""
-        names = [one.name for one in self.elements]
-        return self.elements[: names.index("vertex")]
-
-
-def read_header(path: Path) -> Header:
-    """The header of a file. Raises FormatError where it is not valid."""
-    with path.open("rb") as stream:
-        data = stream.read(LONGEST_HEADER)
-    if not data.startswith(b"ply"):
-        raise FormatError("not a PLY file: it does not start with 'ply'")
-    end = data.find(b"end_header")
-    newline = data.find(b"\n", end)
-    if end < 0 or newline < 0:
-        raise FormatError("the PLY header has no end_header; the file may be truncated")
-    form, elements, comments = "", list[Element](), list[str]()
-    for line in data[:end].decode("latin-1").splitlines()[1:]:
-        words = line.split()
-        if not words:
-            continue
-        if words[0] in ("comment", "obj_info"):
-            comments.append(line.strip().partition(" ")[2])
-            continue
-        try:
-            if words[0] == "format":
-                form = words[1]
-            elif words[0] == "element":
-                elements.append(Element(words[1], int(words[2])))
-            elif words[0] == "property" and words[1] == "list":
-                elements[-1].lists.append((len(elements[-1].properties), TYPES[words[2]], TYPES[words[3]]))
-            elif words[0] == "property":
-                elements[-1].properties.append((words[2], TYPES[words[1]]))
-            else:
-                raise KeyError(words[0])
-        except (IndexError, ValueError, KeyError):
-            raise FormatError(f"a line of the PLY header is not valid: '{line.strip()[:60]}'") from None
-    if form not in ("ascii", "binary_little_endian", "binary_big_endian"):
-        raise FormatError(f"the PLY format '{form}' is unknown")
-    return Header(form, elements, tuple(comments), newline + 1)
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
@@ -192,23 +105,12 @@ def _read_binary(stream: BinaryIO, size: int, header: Header, rows: int) -> Iter
 
 def _find_vertices(stream: BinaryIO, size: int, header: Header) -> int:
     """The position of the first vertex in a binary file."""
-    start, way = header.end, "little" if header.order == "<" else "big"
-    for element in header.before:
-        if not element.lists:
-            start += element.count * make_dtype(element, header.order).itemsize
-        elif element.properties or len(element.lists) > 1:
-            raise FormatError(
-                f"the PLY element '{element.name}' before the vertices has lists and values, which is not supported"
-            )
-        else:
-            _, counter, item = element.lists[0]
-            length, width = np.dtype(counter).itemsize, np.dtype(item).itemsize
-            with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
-                for _ in range(element.count):
-                    if start + length > size:
-                        raise FormatError("the PLY file is truncated")
-                    items = int.from_bytes(data[start : start + length], way)  # type: ignore[arg-type]
-                    start += length + width * items
+    start = header.end
+    if not any(element.lists for element in header.before):
+        return start + sum(one.count * make_dtype(one, header.order).itemsize for one in header.before)
+    with mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ) as data:
+        for element in header.before:
+            start = skip_rows(data, start, element, header.order)
     return start
 
 
@@ -221,6 +123,7 @@ def _read_text(stream: BinaryIO, size: int, header: Header) -> Iterator[Columns]
             raise FormatError("the PLY file is truncated")
     if left * width * 2 > size - stream.tell() + 1:
         raise FormatError(f"the PLY file is truncated: it is too small for the {left} vertices in its header")
+    _require_width(stream, left, width)
     lines, rest, values = left, b"", np.empty(0)
     while left > 0:
         data = stream.read(TEXT)
@@ -237,6 +140,17 @@ def _read_text(stream: BinaryIO, size: int, header: Header) -> Iterator[Columns]
         if left and (not data or lines < 0):
             count = header.vertex.count
             raise FormatError(f"the PLY file is truncated: it has {count - left} of {count} vertices")
+
+
+def _require_width(stream: BinaryIO, rows: int, width: int) -> None:
+    """Raises FormatError where each of the first lines of the vertices has more numbers than the header says."""
+    start = stream.tell()
+    found = {len(stream.readline().split()) for _ in range(min(rows, LINES))}
+    stream.seek(start)
+    if len(found) == 1 and min(found) > width and min(found) % width:
+        raise FormatError(
+            f"the PLY header names {width} properties of a vertex, but the rows have {min(found)} numbers"
+        )
 
 
 def _cut(text: bytes, more: bool) -> tuple[bytes, bytes]:

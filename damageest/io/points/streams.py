@@ -83,7 +83,8 @@ def _open_npy(path: Path) -> PointStream | None:
 
 
 def _open_ply(path: Path) -> PointStream | None:
-    from damageest.io.points.ply import make_points, read_blocks, read_header
+    from damageest.io.points.ply import make_points, read_blocks
+    from damageest.io.points.ply_header import read_header
 
     header = read_header(path)
     vertex = header.vertex

@@ -19,12 +19,13 @@ FEWEST = 5
 """Points in a patch, for it to be held out."""
 LIMIT = 3.0
 """Deviation, in standard deviations of a point, beyond which a held-out point counts no more: damage, dirt."""
+COUNTED = 0.5
+"""Deviation, in tolerances, up to which one counts in any case: where the noise is far below the tolerance, all of the
+skin would lie beyond the limit, and the few points within it would decide."""
 GAIN = 1.5
 """Standard errors by which a freer field has to explain held-out patches better."""
-SHARE = 0.05
-"""Share of the score by which it has to be better at least."""
-
-
+SHARE = 0.1
+"""Share of the score by which it has to be better at least: what a field explains less it makes uncertain again."""
 BALANCE = 0.2
 """Share of what a field explains that has to lie outside the part as it was without it."""
 
@@ -63,7 +64,7 @@ def cross_validate(field: Field, points: Floats, body: Body, freedom: Freedom, s
     for held in (half, ~half):
         fitted = fit(field, points[~held], body, freedom, [scale] * rounds)
         found = match(fitted, points[held], body)
-        limit = LIMIT * body.noise
+        limit = max(LIMIT * body.noise, COUNTED * 4 * body.step)
         off = np.where(found.faces_skin, found.distance, 0.0)
         squares = np.minimum(np.abs(off), limit) ** 2
         both += np.bincount(patch[held], squares, count)

@@ -27,21 +27,27 @@ LOOSEST = 0.1
 NEAR = 0.006
 """Strain of a polynomial from which a lattice starts near it. Waves are no polynomial: the best one may be none, and
 the skin far off."""
+DOWN = 2.5
+"""What a field leaves in half of the patches, in mean squares of the noise, up to which it explains the skin: those of
+deformed parts leave 1.0 to 1.2, and one that swallows the wear of a real bore 56."""
+FAR = 30.0
+"""What the freest polynomial leaves, in the same, from which no lattice is tried."""
 LEFT, SMALL = 1.15, 0.15
 """What a polynomial has to leave in half of the patches for freer fields: mean squares of the noise, and more by what
 is not small, in tolerances. Errors that regions of a scan share are no form."""
 
 
 def climb(
-    points: Floats, body: Body, diagonal: float, tolerance: float, lattice: Sequence[int]
+    points: Floats, body: Body, diagonal: float, tolerance: float, lattice: Sequence[int], strain: float
 ) -> tuple[list[Trial], Trial]:
     """The fields that were tried on half of the points (N,3), and the one that held-out patches bear out, fitted to all
-    of them. ``lattice``: cells along the longest edge of the box of the lattices that may be tried."""
+    of them. ``lattice``: cells along the longest edge of the box of the lattices that may be tried. ``strain``: beyond
+    it a field has to explain the skin down to the noise."""
     half = points[::2]
-    ladder = _Ladder(half, body, choose_scales(half, body, tolerance), *cut_patches(half, diagonal), tolerance)
+    ladder = _Ladder(half, body, choose_scales(half, body, tolerance), *cut_patches(half, diagonal), tolerance, strain)
     ladder.climb_stiff()
     ladder.climb_strained()
-    for cells in lattice:
+    for cells in lattice if ladder.is_near else ():
         ladder.climb_lattice(cells)
     chosen = ladder.chosen
     if chosen is ladder.trials[0]:
@@ -54,7 +60,7 @@ def climb(
 @dataclass(eq=False)
 class _Ladder:
     """The trials so far on points (N,3), each in a ``patch`` (N,) of one of two halves (N,), ``held``, and the one that
-    is ``chosen``. ``grows``: whether the scale is free."""
+    is ``chosen``. ``grows``: whether the scale is free; ``is_near``: whether a polynomial comes near the skin."""
 
     points: Floats
     body: Body
@@ -62,6 +68,8 @@ class _Ladder:
     patch: Ints
     held: Flags
     tolerance: float
+    strain: float
+    is_near: bool = True
     trials: list[Trial] = field(default_factory=list)
     grows: bool = False
     chosen: Trial = field(init=False)
@@ -80,10 +88,13 @@ class _Ladder:
     def climb_strained(self) -> None:
         """Polynomials that strain the metal, freer ones only where those before leave much."""
         freest = self._try(Freedom(STRAINED[-1], self.grows, stretches=True))
+        self.is_near = self.strain >= STRAINED[-1] or self._leaves(freest) < FAR
+        if not self.is_near:
+            return
         if is_better(freest.score, self.chosen.score):
             for bound in STRAINED:
                 self._take(self._attempt(Freedom(bound, self.grows)))
-            self.chosen = freest if is_better(freest.score, self.chosen.score) else self.chosen
+            self._take(freest)
         self.trials.append(freest)
         if self._leaves_much():  # as a taper of a thin part, which is of wear's kind
             self._take(self._attempt(Freedom(LOOSEST, self.grows)))
@@ -106,9 +117,16 @@ class _Ladder:
         small = LEFT * self.body.noise**2 + (SMALL * self.tolerance) ** 2
         return bool(np.median(self.chosen.score.both) > small)
 
+    def _leaves(self, trial: Trial) -> float:
+        """What a field leaves in half of the patches, in mean squares of the noise."""
+        return float(np.median(trial.score.both)) / self.body.noise**2
+
     def _take(self, trial: Trial) -> None:
-        """Chooses a freer field where held-out patches bear it out."""
-        self.chosen = trial if is_better(trial.score, self.chosen.score) else self.chosen
+        """Chooses a freer field where held-out patches bear it out, and the metal could follow it. Wear is no field of
+        low order: one that swallows it leaves more than noise."""
+        if is_better(trial.score, self.chosen.score):
+            is_possible = trial.freedom.bound <= max(self.strain, BENT) or self._leaves(trial) < DOWN
+            self.chosen = trial if is_possible else self.chosen
 
     def _attempt(
         self, freedom: Freedom, start: Field | None = None, scales: list[float] | None = None, body: Body | None = None

@@ -38,9 +38,9 @@ def find_modes(
 
     The posterior of a Gaussian prior on the strain, with the points' error as large as the means of patches show it;
     what the metal may be strained by beyond the skin that is seen, which grows with the distance from it; and the
-    difference to the next freer field that was tried, since the truth may be as free as that; and what the field leaves
-    of intact skin. ``beyond`` (J,V,3): what other parts of the type say about skin that is not seen, in place of a
-    strain.
+    difference to the next freer field that was tried, since the truth may be as free as that. What the field leaves of
+    intact skin is not among them (`measure_left`). ``beyond`` (J,V,3): what other parts of the type say about skin that
+    is not seen, in place of a strain.
     """
     field, places = chosen.field, skin.vertices
     last = max(tolerance, 3 * body.noise)
@@ -63,8 +63,7 @@ def find_modes(
     if beyond is None:
         seen, spacing = found.material[np.abs(found.distance) < tolerance], find_spacing(body, points)
         beyond = BEYOND * go_beyond(places, seen, spacing)[None]
-    left = measure_left(found, weights, body) * skin.vertex_normals
-    modes = np.concatenate([modes, beyond, left[None]])
+    modes = np.concatenate([modes, beyond])
     at = [one.freedom for one in trials].index(chosen.freedom) + 1
     alike = [one for one in trials[at:] if one.freedom.stretches == chosen.freedom.stretches]
     freer = alike[0] if alike else None

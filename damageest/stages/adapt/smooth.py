@@ -22,6 +22,7 @@ from damageest.stages.adapt._field import Body, Field, match, weigh
 from damageest.stages.adapt._fit import fit
 from damageest.stages.adapt._mesh import deform_part, refine, require_injective
 from damageest.stages.adapt._other import (
+    TOLD,
     describe_hidden,
     describe_other,
     describe_unknown,
@@ -29,7 +30,7 @@ from damageest.stages.adapt._other import (
     find_thinned,
     measure_unknown,
 )
-from damageest.stages.adapt._posterior import find_modes, find_spacing
+from damageest.stages.adapt._posterior import find_modes, find_spacing, measure_left
 from damageest.stages.adapt._prior import Start, describe_prior, read_prior, start_from
 from damageest.stages.adapt._words import describe
 
@@ -37,6 +38,9 @@ FEWEST = 200
 """Points that a field is fitted to at least."""
 AVERAGED = 16
 """Neighbours whose deviations are averaged, so that noise is not taken for form."""
+STRAINS = {"metal": 0.003, "casting": 0.01, "sheet": 0.03, "polymer": 0.1}
+"""Strain that metal keeps when it was bent, about its yield strain or a little more, and that of parts whose form is as
+they came out of the mould or the press."""
 SEEN = 4000
 """Places that tell which skin was seen, about."""
 
@@ -55,6 +59,12 @@ class Smooth(Adapt):
         (4,), max_length=4, description="cells of the lattices that are tried, along the longest edge of the box"
     )
 
+    process: Literal["metal", "casting", "sheet", "polymer"] = Option(
+        "metal",
+        description="how the part was made, which says what strain beyond that of a bend or a twist its form may have: "
+        "0.3 % for metal, 1 % for a casting, 3 % for sheet, 10 % for a polymer; more is only taken where it explains "
+        "the skin down to the noise",
+    )
     prior: JobPaths = Option(
         (),
         max_length=500,
@@ -87,7 +97,7 @@ class Smooth(Adapt):
             start = start_from(forms, part, points, body, choose_scales(points, body, tolerance), tolerance)
         if start and start.used.is_used and (adapted := self._go_on(start, part, centre, points, body, tolerance)):
             return adapted
-        trials, chosen = climb(points, body, part.diagonal, tolerance, self.lattice)
+        trials, chosen = climb(points, body, part.diagonal, tolerance, self.lattice, STRAINS[self.process])
         if chosen is trials[0]:
             return None
         adapted = self._finish(part, centre, points, body, trials, chosen, tolerance)
@@ -105,7 +115,8 @@ class Smooth(Adapt):
         shape = replace(fine, vertices=start.field.move(fine.vertices - centre) + centre)
         own, moved = prepare(shape, centre, tolerance, body.noise), move_points(points, start.motion)
         held = start.find_held(len(points))
-        trials, chosen = climb(np.concatenate([moved, held]), own, part.diagonal, tolerance, self.lattice)
+        strain = STRAINS[self.process]
+        trials, chosen = climb(np.concatenate([moved, held]), own, part.diagonal, tolerance, self.lattice, strain)
         # the points that hold the field where no skin is left are no part of the scan
         after = score(chosen.field, chosen.freedom, moved, own, part.diagonal, tolerance)
         rigid = fit(Field.zero(body.basis), points[::2], body, RIGID, choose_scales(points, body, tolerance))
@@ -191,16 +202,22 @@ class Smooth(Adapt):
             reach=find_spacing(body, points[:SEEN]),
             prior=start.used if start else None,
             designed=identify_part(part),
+            unfollowed=measure_left(found, weigh(found, max(tolerance, 3 * body.noise), body.noise), body),
         )
         rival, is_open = find_other(trials, chosen, body.noise)
         other = (rival.field.displace(begun) - field.displace(begun)) @ turn.T if rival and is_open else None
         compared, hidden = _compare(body, trials, chosen, rival, is_open, tolerance, part.unit)
+        lowered = None
+        if hidden and (stiff := find_stiff(trials)) is not None:
+            more = stiff.field.displace(begun) - field.displace(begun)
+            depth = np.einsum("ij,ij->i", more, Mesh(begun, fine.faces).vertex_normals)
+            lowered = np.where(depth > TOLD * tolerance, depth, 0.0)
         notes = (describe(adapted, tolerance), *compared)
         if start:
             notes = (*notes, describe_prior(start, tolerance, part.unit))
         if (unknown := measure_unknown(modes, adapted.part.vertex_normals)) > tolerance / 2:
             notes = (*notes, describe_unknown(unknown, tolerance, part.unit))
-        return replace(adapted, notes=notes, other=other, hidden=hidden)
+        return replace(adapted, notes=notes, other=other, hidden=hidden, lowered=lowered)
 
 
 def _compare(
@@ -212,11 +229,17 @@ def _compare(
     if rival and (thinned := find_thinned(body.mesh, chosen.field, rival.field, tolerance)).area:
         notes.append(describe_other(thinned, is_open, unit))
     if chosen.freedom.bound > BENT:
-        stiff = min((one for one in trials if one.freedom.bound <= BENT), key=lambda one: float(one.score.both.mean()))
-        if (thinned := find_thinned(body.mesh, stiff.field, chosen.field, tolerance)).area:
+        stiff = find_stiff(trials)
+        if stiff is not None and (thinned := find_thinned(body.mesh, stiff.field, chosen.field, tolerance)).area:
             notes.append(describe_hidden(thinned, unit))
             hidden = thinned.volume
     return notes, hidden
+
+
+def find_stiff(trials: list[Trial]) -> Trial | None:
+    """The best of the fields that strain the metal no more than a bend or a twist does."""
+    stiff = [one for one in trials if one.freedom.bound <= BENT]
+    return min(stiff, key=lambda one: float(one.score.both.mean())) if stiff else None
 
 
 def average(places: Floats, values: Floats, asked: Floats) -> Floats:

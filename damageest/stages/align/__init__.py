@@ -55,10 +55,23 @@ class Align(Stage, ABC):
 
     stage: ClassVar[str] = "align"
     gives: ClassVar[str] = "pose"
+    gives_fitted_pose: ClassVar[bool] = True
+    """Whether the pose is fitted to the scan: then errors of the scan move it, and damage may. False where it is known
+    from elsewhere, as from a fixture."""
+
+    @property
+    def moves_views(self) -> bool:
+        """Whether views of the scan that lie off the others are to be put right after it."""
+        return False
+
+    @property
+    def datums(self) -> Any:
+        """The datums that fix the pose: CAD faces and selectors; by letter, where they are a system. Empty for none."""
+        return ()
 
     def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
-        """Those of an option `datum` as well, which may name CAD faces without a selector."""
-        datum: Any = getattr(self, "datum", ())
+        """Those of the datums as well, which may name CAD faces without a selector."""
+        datum: Any = self.datums
         lists: dict[tuple[str | int, ...], Any] = {("datum",): datum}
         if isinstance(datum, Mapping):  # a system: datums by letter, each a list or a mapping with the list in it
             lists = {

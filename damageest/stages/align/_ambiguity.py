@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
+
 import numpy as np
 
-from damageest.artefacts import Floats, Reason
+from damageest.artefacts import Floats, FreeMotion, Reason
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._choose import MANY, Choice, is_worse
 from damageest.stages.align._field import PartSurface
 from damageest.stages.align._fine import fit, robust_cost
+from damageest.stages.align._frame import Frame
 from damageest.stages.align._points import orient_surface
 from damageest.stages.align._prepare_part import PreparedPart
 from damageest.stages.align._symmetries import SAME as SAME_SYMMETRY
 from damageest.stages.align._symmetries import measure_apart
+from damageest.stages.align._words import name_motion, to_free_motion
 
 SAME = 0.002
 """Distance, in diagonals, up to which places of two surfaces are the same for a symmetry, where the scan is coarser."""
@@ -20,15 +25,22 @@ SAME = 0.002
 FEW = 4000
 """Points, spread over the scan, that are asked first whether a pose fits worse."""
 
+LOOSE, BANDS = 0.01, 6.0
+"""Mean square by which the skin moves along its normal for each unit of a motion that the points may not fix; and by
+how many bands such a motion is tried."""
+FARTHEST, HALVED = 0.25, 3
+"""Farthest movement that is looked for, in diagonals, and halvings of the last step."""
+
 REMEDY = "where the pose is known, give it to align: icp or align: none"
 
 
-def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: float) -> tuple[Reason, ...]:
-    """A doubt where the scan does not fix the pose; empty where it does.
+def find_loose_motions(frame: Frame, pose: Floats, points: Floats, band: float, unit: str) -> tuple[FreeMotion, ...]:
+    """The motions by which the scan can be moved and fits as well, with how far; empty where it fixes the pose.
 
     A bar with both ends missing or unseen fits at any place along its axis. Each motion that hardly changes the points'
-    distances to their planes is tried, by a few bands in both directions.
+    distances to their planes is tried, in both directions from a few bands on, until the scan fits much worse.
     """
+    target = frame.target
     at = move_points(points, pose)
     distance, _, face = target.closest(at)
     on = np.abs(distance) < band
@@ -36,16 +48,40 @@ def note_free_motion(pose: Floats, target: PartSurface, points: Floats, band: fl
     stiffness, motions = np.linalg.eigh(jacobian.T @ jacobian / max(int(on.sum()), 1))
     surface = orient_surface(target.known, 5000, np.random.default_rng(0)).points
     here = robust_cost(distance, band)
-    for twist in motions.T[stiffness < 0.01]:
-        for D in make_motions(np.stack([twist, -twist]) * 6 * band):
-            differs = float((np.abs(target.closest(move_points(surface, D))[0]) > band).mean())
-            if differs > 0.002 and not _is_much_worse(target, points, D @ pose, band, here):
-                text = (
-                    "the scan does not fix the pose: the part can be moved or turned a little and fits as well, "
-                    "because the surface that would prevent it is missing or was not seen"
-                )
-                return (Reason("pose_free", text, "contradicts", remedy=REMEDY),)
-    return ()
+    found = []
+
+    def fits(motion: Floats) -> bool:
+        return not _is_much_worse(target, points, make_motions(motion[None])[0] @ pose, band, here)
+
+    for twist in motions.T[stiffness < LOOSE]:
+        ends = [0.0, 0.0]
+        for k, sign in enumerate((-1.0, 1.0)):
+            start = sign * BANDS * band * twist
+            moved = target.closest(move_points(surface, make_motions(start[None])[0]))[0]
+            if (np.abs(moved) > band).mean() > 0.002 and fits(start):
+                ends[k] = sign * _find_end(fits, sign * twist, BANDS * band)
+        if any(ends):
+            one = to_free_motion(frame, twist, ends[0], ends[1], unit)
+            text = (
+                f"the scan does not fix the pose for {name_motion(one)}, from {one.low:.3g} to {one.high:+.3g} {unit}: "
+                "it fits as well, because the surface that would prevent it is missing, worn or was not seen; "
+                f"{REMEDY}"
+            )
+            found.append(replace(one, text=text))
+    return tuple(found)
+
+
+def _find_end(fits: Callable[[Floats], bool], way: Floats, start: float) -> float:
+    """How far, in diagonals, the scan can be moved along a way (6,) and fits, from ``start`` on, where it does."""
+    low, high = start, 2 * start
+    while high < FARTHEST and fits(high * way):
+        low, high = high, 2 * high
+    if high >= FARTHEST:
+        return min(low, FARTHEST)
+    for _ in range(HALVED):
+        middle = (low + high) / 2
+        low, high = (middle, high) if fits(middle * way) else (low, middle)
+    return high
 
 
 def _is_much_worse(target: PartSurface, points: Floats, pose: Floats, band: float, here: Floats) -> bool:

@@ -19,6 +19,9 @@ LOW = 1.5
 """Distance outside, in tolerances, up to which points are skin; added metal is higher."""
 MOST_ROUGH = 0.35
 """Share of the patches that may scatter by more than noise does, where the points lie on worn skin."""
+ANOTHER = 0.003
+"""Distance from the skin, in diagonals, within which skin that deviates is still that of this part, in however small a
+tolerance: the smaller that is, the more of it wear and form take out of it. Another part lies farther off."""
 FORM = 0.12
 """Standard deviation, in tolerances, that errors of form and of a given pose may give the mean of a patch."""
 
@@ -44,10 +47,13 @@ def check_with_wear(
     """As `check_pose`. Skin that is worn down to ``worn_depth``, with nothing outside, explains a scan as intact skin
     does."""
     check = check_pose(target, fitted, even, raw, tolerance)
-    if (check.is_acceptable and not check.note_doubts()) or worn_depth <= tolerance:
+    if check.is_acceptable and not check.note_doubts():
         return check
-    worn = check_pose(target, fitted, even, raw, worn_depth)
-    return replace(worn, rms=check.rms, inliers=check.inliers) if worn.is_acceptable else check
+    if (wide := max(ANOTHER, worn_depth)) <= tolerance:
+        return check
+    worn = check_pose(target, fitted, even, raw, wide)
+    is_shown = worn.is_acceptable and (worn_depth > tolerance or not worn.note_doubts())
+    return replace(worn, rms=check.rms, inliers=check.inliers) if is_shown else check
 
 
 def measure_given_wear(target: PartSurface, pose: Floats, points: Floats, noise: float, tolerance: float) -> float:

@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
-from damageest.stages.align._ambiguity import note_free_motion
+from damageest.stages.align._ambiguity import find_loose_motions
 from damageest.stages.align._by_system import finish_by_datum
 from damageest.stages.align._check_worn import check_with_wear
 from damageest.stages.align._datum import Datum
@@ -53,11 +53,13 @@ def fit_from_start(
             "raise iterations, or use align: register",
         )
     doubts = result.note_doubts() + finish.doubts
-    if not (finish.free or finish.datums):  # those have amounts, and are terms of the intervals
-        doubts += note_free_motion(best.pose, frame.target, points, best.band)
+    free, loose = finish.free, tuple[str, ...]()
+    if not (free or finish.datums):
+        free = find_loose_motions(frame, best.pose, points, best.band, part.unit)
+        loose = tuple(one.text for one in free)
     pose = frame.unscale_pose(best.pose)
-    notes = (*map(str, doubts), *finish.notes)
+    notes = (*map(str, doubts), *loose, *finish.notes)
     return Pose(
         pose, result.rms * frame.size, result.inliers, notes=notes, doubts=doubts,
-        free=finish.free, is_held=finish.is_held, datums=finish.datums, left=finish.left, spread=finish.spread,
+        free=free, is_held=finish.is_held, datums=finish.datums, left=finish.left, spread=finish.spread,
     )  # fmt: skip

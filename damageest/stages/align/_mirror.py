@@ -27,9 +27,9 @@ STEP = 5.0
 FITTED = 3
 """Number of mirror planes of each point whose poses are fitted."""
 
-LESS, LARGE_GAIN = 0.6, 0.04
-"""For the mirrored scan to be the better one: the share of the points off the part that it may keep, or the share of
-the points near the part that lies on it only where the scan is mirrored."""
+LESS, FAR_LESS, LARGE_GAIN = 0.6, 0.35, 0.04
+"""For the mirrored scan to be the better one, or by far the better one: the share of the points off the part that it
+may keep; or the share of the points near the part that lies on it only where the scan is mirrored."""
 
 SUSPECT = 0.82
 """Share of the points near the part on its surface below which poses are searched for from the beginning once more, of
@@ -41,6 +41,9 @@ MIN_GAIN = 0.015
 SYMMETRIC, OFF = 0.005, 0.004
 """Share of the skin seen that a reflection may take off the part, by more than the second, for it to be symmetric: then
 a scan and its mirror image show the same."""
+
+WHOLE = 0.7
+"""Share of the part's surface that a mirrored scan covers, from which skin that is symmetric explains it no more."""
 
 LITTLE = 0.3
 """Share of the part's surface below which a scan that fits better mirrored is doubted and not refused: a few faces have
@@ -95,20 +98,27 @@ def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random
     if check.agreement < SUSPECT:
         proper, mirrored = [_search_again(test, rng, 1.0)], _search_again(test, rng, -1.0)
     else:
-        mirrored = max(_fit_reflections(test, best), key=lambda one: _measure_share_on(test, one, best.band))
+        tried = [*_fit_reflections(test, best), _search_again(test, rng, -1.0)]
+        mirrored = max(tried, key=lambda one: measure_share_on(test, one.pose, best.band))
     of_mirrored = test.check(mirrored, best.band)
     if _is_better(of_mirrored, check):
         # a mirror image of the mirrored scan is a pose of the scan: of skin that is symmetric it fits as well
         proper += _fit_reflections(test, mirrored)
+        if _is_far_better(of_mirrored, check) and check.agreement >= SUSPECT:
+            proper.append(_search_again(test, rng, 1.0))  # as hard as the mirrored one was
     result = Handedness()
     if proper:
-        found = max(proper, key=lambda one: _measure_share_on(test, one, best.band))
+        found = max(proper, key=lambda one: measure_share_on(test, one.pose, best.band))
         of_found = test.check(found, best.band)
         if of_found.agreement > check.agreement + MIN_GAIN:
             is_open = test.weigh(found, best) < DECISIVE and check.is_acceptable
             result = Handedness(found, best.pose[None] if is_open else NONE)
             best, check = found, of_found
-    if not (of_mirrored.is_acceptable and _is_better(of_mirrored, check)) or _shows_symmetric(test, best, mirrored):
+    if not (of_mirrored.is_acceptable and _is_better(of_mirrored, check)):
+        return result
+    # of skin that the scan shows nearly whole, a pose that were as good unmirrored would have been found
+    is_whole = of_mirrored.cover > WHOLE and _is_far_better(of_mirrored, check)
+    if not is_whole and _shows_symmetric(test, best, mirrored):
         return result
     if test.weigh(mirrored, best) < DECISIVE:
         return result
@@ -121,6 +131,12 @@ def _is_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
     """Whether the mirrored scan lies on the part clearly better than the unmirrored one."""
     gain = mirrored.agreement - check.agreement
     return gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - mirrored.agreement < LESS * (1 - check.agreement))
+
+
+def _is_far_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
+    """Whether it lies on the part so much better that skin which is nearly symmetric does not explain it."""
+    gain = mirrored.agreement - check.agreement
+    return gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - mirrored.agreement < FAR_LESS * (1 - check.agreement))
 
 
 def _fit_reflections(test: MirrorTest, best: Fit) -> list[Fit]:
@@ -167,8 +183,9 @@ def _make_reflections(middle: Floats) -> Floats:
     return result
 
 
-def _measure_share_on(test: MirrorTest, one: Fit, band: float) -> float:
-    distance = test.part.surface.closest(move_points(test.points[:POINTS], one.pose))[0]
+def measure_share_on(test: MirrorTest, pose: Floats, band: float) -> float:
+    """The share of the points that a pose (4,4) puts on the part."""
+    distance = test.part.surface.closest(move_points(test.points[:POINTS], pose))[0]
     return float((np.abs(distance) < band).mean())
 
 

@@ -6,11 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Mesh
+from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
 from damageest.geometry.morton import encode_cells
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.sheets import find_own_sheet, measure_spread
 from damageest.geometry.threads import count_threads
+from damageest.geometry.vectors import spread_directions
 from damageest.geometry.voxels import measure_bounds
 
 MAX_DENSE = 120_000
@@ -21,6 +23,12 @@ NEIGHBOURS = 64
 
 MAX_NEIGHBOURS = 512
 """The same where it does: fewer, in a dense scan, would all lie within the noise and show no plane."""
+
+FLAT = 0.15
+"""Least of the squared widths of a neighbourhood over the second, below which it is flat."""
+
+MOSTLY = 0.5
+"""Share of flat neighbourhoods below which those of one skin are looked for."""
 
 MAX_RADIUS = 0.05
 """Largest distance in diagonals of the part of the points that a normal is fitted to."""
@@ -99,18 +107,22 @@ def orient_scan(
         ]
     )
     there = near < len(every)
-    around = every[np.minimum(near, len(every) - 1)] - dense[chosen][:, None]
-    count = np.maximum(there.sum(1), 1)[:, None]
-    around = (around - (around * there[..., None]).sum(1, keepdims=True) / count[..., None]) * there[..., None]
-    value, axes = np.linalg.eigh(np.swapaxes(around, 1, 2) @ around)
-    direction = axes[:, :, 0]
-    flat = (there.sum(1) >= 6) & (value[:, 0] < 0.15 * value[:, 1])
+    off = every[np.minimum(near, len(every) - 1)] - dense[chosen][:, None]
+    direction, flat = _fit_normals(off, there)
+    if flat.mean() < MOSTLY:  # the part is of thin walls, and neighbours lie on both of their skins
+        direction, flat = _fit_normals(off, find_own_sheet(off, there))
     if normals is not None:
         given = normals[index][chosen]
         direction = np.where(np.einsum("ij,ij->i", direction, given)[:, None] < 0, -direction, direction)
         flat &= np.linalg.norm(given, axis=1) > 0.5
     keep = np.flatnonzero(flat)
     return dense, weights, OrientedPoints(dense[chosen][keep], direction[keep], normals is not None)
+
+
+def _fit_normals(off: Floats, chosen: Flags) -> tuple[Floats, Flags]:
+    """Normals (N,3) of planes through the ``chosen`` (N,K) neighbours (N,K,3), and whether these are flat (N,)."""
+    value, axes = np.linalg.eigh(measure_spread(off, chosen))
+    return axes[:, :, 0], (chosen.sum(axis=1) >= 6) & (value[:, 0] < FLAT * value[:, 1])
 
 
 def orient_surface(part: Mesh, wanted: int, rng: np.random.Generator) -> OrientedPoints:
@@ -123,10 +135,7 @@ def draw_by_direction(cloud: OrientedPoints, wanted: int, rng: np.random.Generat
     """``wanted`` points of a cloud, with rare directions of the normal drawn more often: the edge faces of a plate fix
     its pose better than more points on its large faces."""
     count = 128
-    step = np.arange(count) + 0.5
-    polar, azimuth = np.arccos(1 - 2 * step / count), np.pi * (1 + 5**0.5) * step
-    compass = np.stack([np.cos(azimuth) * np.sin(polar), np.sin(azimuth) * np.sin(polar), np.cos(polar)], 1)
-    match = cloud.normals @ compass.T
+    match = cloud.normals @ spread_directions(count).T
     nearest = np.argmax(match if cloud.signed else np.abs(match), axis=1)
     weights = 1 / np.sqrt(np.bincount(nearest, minlength=count)[nearest])
     return cloud.take(draw_evenly(cloud.points, weights, wanted, rng))

@@ -38,6 +38,10 @@ class Icp(Align):
     )
     datum: Datum = NO_DATUM
 
+    @property
+    def datums(self) -> Datum:
+        return self.datum
+
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where the fit does not converge, or its pose does not explain the scan."""
         from damageest.stages.align._fit_start import fit_from_start

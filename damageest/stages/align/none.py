@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field as Option
@@ -22,6 +22,7 @@ class KnownPose(Align):
     """
 
     use: Literal["none"] = "none"
+    gives_fitted_pose: ClassVar[bool] = False
     T_part_scan: RigidPose | None = Option(
         None,
         description="the pose T_part_scan, 4x4, from the scan's frame to the part's, in the job's unit; default: "

@@ -50,6 +50,10 @@ class Points(Align):
     )
     datum: Datum = NO_DATUM
 
+    @property
+    def datums(self) -> Datum:
+        return self.datum
+
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where the pairs contradict each other, and where the fit from them does
         not converge or does not explain the scan."""

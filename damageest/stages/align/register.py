@@ -34,11 +34,19 @@ class Register(Align):
     )
     datum: Datum = NO_DATUM
 
+    @property
+    def moves_views(self) -> bool:
+        return self.fit_views
+
+    @property
+    def datums(self) -> Datum:
+        return self.datum
+
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._ambiguity import describe_choice, note_ambiguity, note_free_motion
+        from damageest.stages.align._ambiguity import describe_choice, find_loose_motions, note_ambiguity
         from damageest.stages.align._choose import COARSE, Choice, choose_pose
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
@@ -48,6 +56,7 @@ class Register(Align):
         from damageest.stages.align._pairs import propose_poses
         from damageest.stages.align._points import draw_evenly, draw_stratified, orient_scan
         from damageest.stages.align._prepare_part import prepare_part
+        from damageest.stages.align._scale import ask_scale
         from damageest.stages.align._search import search
         from damageest.stages.align._system import find_datum
 
@@ -81,8 +90,13 @@ class Register(Align):
         last = LastFit(frame, fine, dense, noise, tolerance / frame.size, part.unit, datum)
         finish, check = last.run(fit(target, fine, choice.pose, COARSE / 2, noise, 30))
         doubts: tuple[Reason, ...] = ()
-        if check.agreement < 1 - MIN_GAIN:  # else no mirrored pose can be that much better
-            test = MirrorTest(prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials)
+        test = MirrorTest(prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials)
+        scaled = ask_scale(test, finish.fit, check, rng)
+        if scaled is not None:
+            if not check.is_acceptable:
+                raise scaled.build_error(check)
+            doubts = (scaled.make_doubt(check),)
+        elif check.agreement < 1 - MIN_GAIN:  # else no mirrored pose can be that much better
             hand = ask_handedness(test, finish.fit, check, rng)
             doubts = hand.doubts
             if hand.better is not None:
@@ -98,14 +112,16 @@ class Register(Align):
             poses = turns @ best.pose if finish.is_changed else choice.others
             others = np.array([frame.unscale_pose(pose) for pose in poses])
         doubts = check.note_doubts() + finish.doubts + doubts + note_ambiguity(choice, prepared)
-        if not (finish.free or finish.datums):  # those have amounts, and are terms of the intervals
-            doubts += note_free_motion(best.pose, target, fine, best.band)
+        free, loose = finish.free, tuple[str, ...]()
+        if not (free or finish.datums):
+            free = find_loose_motions(frame, best.pose, fine, best.band, part.unit)
+            loose = tuple(one.text for one in free)
         told = note_inward(target, frame, scan, best)
-        notes = (*describe_choice(choice), *told, *map(str, doubts), *finish.notes)
+        notes = (*describe_choice(choice), *told, *map(str, doubts), *loose, *finish.notes)
         pose = frame.unscale_pose(best.pose)
         rms = check.rms * frame.size
         return Pose(
-            pose, rms, check.inliers, others, notes, doubts, finish.free, finish.is_held, finish.datums, finish.left,
+            pose, rms, check.inliers, others, notes, doubts, free, finish.is_held, finish.datums, finish.left,
             finish.spread,
         )  # fmt: skip
 

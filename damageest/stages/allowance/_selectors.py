@@ -58,6 +58,15 @@ class KeepOut(Selector):
         """Whether it describes a solid, not skin."""
         return self.conditions() in ([], ["box"])
 
+    def bound_solid(self) -> Floats | None:
+        """(2,3) corners of the box round the solid; None for skin, or for a file."""
+        if self.cylinder is not None:
+            ends = np.array([self.cylinder.start, self.cylinder.end])
+            axis = (ends[1] - ends[0]) / np.linalg.norm(ends[1] - ends[0])
+            wide = self.cylinder.radius * np.sqrt(np.maximum(1 - axis**2, 0))
+            return np.array([ends.min(axis=0) - wide, ends.max(axis=0) + wide])
+        return np.array(self.box) if self.conditions() == ["box"] else None
+
     def chooses_skin(self) -> bool:
         """Whether it selects skin that gets no stock."""
         return not self.is_solid()

@@ -52,14 +52,16 @@ class DepositGeometry:
 
 
 def check_deposit(
-    work: DepositGeometry, part: Part, tolerance: float, conflicts: Sequence[StockConflict]
-) -> tuple[float, float, float] | None:
+    work: DepositGeometry, part: Part, tolerance: float, conflicts: Sequence[StockConflict], refuse: bool = True
+) -> tuple[tuple[float, float, float] | None, list[str]]:
     """The smallest, mean and largest thickness of the stock; None where the job asks for none. Where walls or regions
-    to keep free end the stock everywhere, the thickness up to them.
+    to keep free end the stock everywhere, the thickness up to them. And what is to be said of it.
 
-    ``conflicts``: places without room, where the stock may be thinner. Raises StageError with the measured value where
-    the deposit does not keep a guarantee.
+    ``conflicts``: places without room, where the stock may be thinner. ``refuse``: whether a thickness that is not as
+    wanted is an error; else it is said. Raises StageError with the measured value where the deposit does not keep a
+    guarantee.
     """
+    said: list[str] = []
     # by volumes: the solids have thousands of faces in common, with which their differences take a second each
     joined = work.cavity.volume() + work.stock.volume() - (work.cavity ^ work.stock).volume()
     missing = (joined - work.deposit.volume()) / work.cavity.volume()
@@ -71,21 +73,24 @@ def check_deposit(
     over, place = find_stray_stock(work, part, tolerance)
     if over > MAX_MISSED:
         near = ", ".join(f"{value:.4g}" for value in place)
-        raise StageError(
-            f"there is stock on {over:.1%} of the skin around the damage that must have none, for example at ({near})",
-            "use targets with a smaller outer there, or keep_out",
+        text = (
+            f"there is stock on {over:.1%} of the skin around the damage that must have none, for example at ({near})"
         )
+        if refuse:
+            raise StageError(text, "use targets with a smaller outer there, keep_out, or crowded: clip")
+        said.append(text)
     tall = work.skin.select(work.skin.height > 0)
     if not len(tall.faces):
-        return None
+        return None, said
     found = measure_thickness(work, tall, part, conflicts)
     wrong = found.is_wrong(tolerance, ON_PART * part.diagonal)
     if wrong.mean() > MAX_MISSED:
-        worst = float(np.abs(found.thick - found.height)[wrong].max())
-        raise StageError(
-            f"the thickness of the stock is wrong on {wrong.mean():.1%} of the skin, by up to {worst:.3g}",
-            "use a larger tolerance, or a smaller outer",
-        )
+        off = np.where(wrong, np.abs(found.thick - found.height), 0.0)
+        near = ", ".join(f"{value:.4g}" for value in found.points[off.argmax()] + work.origin)
+        text = f"the thickness of the stock is wrong on {wrong.mean():.1%} of the skin, by up to {off.max():.3g}"
+        if refuse:
+            raise StageError(text, "use a larger tolerance, a smaller outer, or crowded: clip")
+        said.append(f"{text}, near ({near})")
     away = 10 * ON_PART * part.diagonal
     # at the border a ray along the normal may leave through the side wall; that is not the thickness
     rims = tall.find_border_edges()
@@ -97,7 +102,7 @@ def check_deposit(
         own = np.minimum(found.along, found.height)
         first, _ = prepare_rays(part).find_first(found.points + work.origin + away * found.normal, found.normal)
         own = np.minimum(own, first + away)
-    return float(own.min()), float(own.mean()), float(own.max())
+    return (float(own.min()), float(own.mean()), float(own.max())), said
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,14 @@ from pydantic import Field
 
 from damageest.artefacts import Deposit, Floats, Part, Solid
 from damageest.errors import StageError
+from damageest.geometry.near_faces import name_nearest_skin
+from damageest.geometry.selectors import Selector
 from damageest.stages.allowance import Allowance
 from damageest.stages.allowance._booleans import drop_crumbs
 from damageest.stages.allowance._limits import StockConflict
 from damageest.stages.allowance._prepare import Prepare, open_cavity
 from damageest.stages.allowance._selectors import KeepOut, StockPlan, StockTarget
+from damageest.stages.allowance._skin import ON_PART
 
 MAX_DUST = 1e-6
 """Share of the stock's volume up to which an overlap is left: it is a rounding error."""
@@ -72,12 +75,30 @@ class Milling(Allowance):
         "clip (the stock ends at the wall or fills the gap; a warning says where)",
     )
 
+    def find_idle_region(self, selector: Selector, part: Part) -> str:
+        """Why a solid to keep free keeps nothing free: it is beyond the reach of stock on this part."""
+        bounds = selector.bound_solid() if isinstance(selector, KeepOut) else None
+        if bounds is None:
+            return ""
+        reach = 2 * StockPlan(self.outer, self.targets, self.keep_out).max_height + ON_PART * part.diagonal
+        gap = np.maximum(bounds[0] - part.bounds[1], part.bounds[0] - bounds[1])
+        if (gap <= reach).all():
+            return ""
+        x, y, z = part.bounds.T
+        return (
+            f"this solid is {float(np.linalg.norm(np.maximum(gap, 0))):.4g} from the box of the part, "
+            f"x {x[0]:.4g} to {x[1]:.4g}, y {y[0]:.4g} to {y[1]:.4g}, z {z[0]:.4g} to {z[1]:.4g}, where no deposit "
+            f"reaches: {name_nearest_skin(Selector(box=tuple(map(tuple, bounds.tolist()))), part)}; correct it "
+            "(lengths in the job's unit, places in part coordinates), or remove it"
+        )
+
     def run(self, damage: Solid, part: Part, tolerance: float, others: Solid | None) -> Solid | None:
         """The deposit. Raises StageError where there is no room for the stock, where the damage volume lies in a region
         to keep free, or where the finished deposit does not keep a guarantee."""
         from manifold3d import Manifold
 
-        from damageest.geometry.solids import subtract_lost, to_manifold
+        from damageest.geometry.bubbles import fill_bubbles, find_bubbles
+        from damageest.geometry.solids import subtract_lost, to_manifold, to_solid
         from damageest.geometry.touching import separate_sheets
         from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
         from damageest.stages.allowance._cut_back import cut_back
@@ -111,16 +132,22 @@ class Milling(Allowance):
             raise StageError(str(narrow[0]), "use targets with a smaller outer there, keep_out, or crowded: clip")
         stock = sum((build_stock(each, tolerance / 2, has_room=not conflicts) for each in skins), Manifold())
         stock = simplify_exactly(stock, part.diagonal)
+        clipped = 0.0
         for body in (left, barred):
             within = stock ^ body
             # cutting off rounding errors would leave lines where the stock only touches the skin below it
             if within.volume() > MAX_DUST * stock.volume():
+                clipped += within.volume() if body is left else 0.0
                 stock = subtract_lost(stock, within)
         stock = keep_touching(stock, hole, tolerance)
         deposit = simplify_exactly(join(hole, stock), part.diagonal)
-        thickness = check_deposit(
-            DepositGeometry(deposit, hole, stock, left, barred, skin, band, origin), part, tolerance, conflicts
-        )
+        filled = fill_bubbles(deposit, left + barred, part, origin)
+        if filled is not deposit:  # between stock on the skin and stock that overlaps the rim
+            stock, deposit = stock + (filled - deposit), filled
+        thickness, doubts = check_deposit(
+            DepositGeometry(deposit, hole, stock, left, barred, skin, band, origin), part, tolerance, conflicts,
+            refuse=self.crowded == "refuse",
+        )  # fmt: skip
         milled: Solid | None = None
         if self.prepare is not None and cavity is not damage:
             milled = separate_sheets(hole - to_manifold(damage, origin), origin, tolerance)
@@ -129,7 +156,13 @@ class Milling(Allowance):
         if body is None:
             raise StageError("the deposit is empty", "use a slightly different outer")
         body = drop_crumbs(body, origin, crumb)
-        notes = [f"{conflict}; clipped there" for conflict in narrow[:1]]
+        if bubbles := find_bubbles(body, lambda: left + barred, part, origin):  # some are apart only now
+            body = to_solid(sum(bubbles, to_manifold(body, origin)), origin) or body
+        notes = [
+            f"{conflict}; clipped there: {clipped:.4g} of stock in volume, which would lie in metal, is left out"
+            for conflict in narrow[:1]
+        ]
+        notes += doubts
         notes += _describe_touching(conflicts, part)
         notes += _describe_stock(thickness, skins)
         return Deposit(

@@ -16,6 +16,8 @@ from damageest.stages.cluster._density import measure_neighbour_distances, run_d
 
 NEIGHBOURHOOD = 12
 """Number of nearest scan points, itself included, among which other damage points are counted."""
+LEFT_OUT = 0.05
+"""Share of the damaged points that are in no group, from which it is told."""
 MIN_DAMAGE = 4
 """How many of these, itself included, must be damage. Where noise moves one point in 700 beyond the tolerance (a
 tolerance of four standard deviations and a pose error of one), one such point in two million has three others beside
@@ -72,18 +74,16 @@ class Dbscan(Cluster):
         number[order] = np.arange(1, len(order) + 1)
         label[damage] = number[inverse.ravel()]
         noise = int((label[damage] == 0).sum())
-        notes = [
-            f"damaged points nearer than {eps:.4g} to each other are grouped (eps, {why}; {dense} neighbours): "
-            f"{noise} of {len(damage)} are in no group"
-        ]
+        notes = []
+        if noise > LEFT_OUT * len(damage):
+            notes.append(
+                f"damaged points nearer than {eps:.4g} to each other are grouped (eps, {why}; {dense} neighbours): "
+                f"{noise} of {len(damage)} are in no group"
+            )
         if eps < bridging / 2:
             notes.append(
                 f"eps is shorter than the distance that bridges the gaps of the scan ({bridging:.4g}): damage sites "
                 "may be split or missed; use a larger eps"
-            )
-        if dense < self.neighbours:
-            notes.append(
-                f"the scan is sparse for its tolerance: {dense} neighbours are asked for, not {self.neighbours}"
             )
         return Sites(label, len(order), tuple(notes))
 

@@ -54,7 +54,7 @@ class Enclose(Stage, ABC):
 
             def run(self, surface: Surface, rims: Rims, tolerance: float) -> Mesh:
                 if len(rims.loops) != 1:
-                    raise StageError(f"the damage surface has {len(rims.loops)} rims, not one", "enclose: adaptive")
+                    raise StageError(f"the damage surface has {len(rims.loops)} rims, not one", "enclose: divide")
                 rim = surface.vertices[rims.loops[0]]
                 out = rim.mean(axis=0) - surface.vertices.mean(axis=0)
                 raised = rim + 2 * tolerance * out / np.linalg.norm(out)

@@ -6,18 +6,21 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Mesh, Part
+from damageest.artefacts import Flags, Floats, Mesh, Part, Surface
 from damageest.errors import StageError
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.solids import compose_shells, to_arrays, to_manifold
+from damageest.geometry.vectors import normalise
 from damageest.stages.enclose import NotSeparatedError
 from damageest.stages.enclose._outside import Sheet
 
 THIN = 2e-4
 """Half of the thickness of the cut, in tolerances."""
+UPRIGHT = 0.5
+"""Cosine between a face's normal and that of its corner, at least, where the sheet does not fold."""
 MOST_BOTH = 0.02
-"""Area of a body on the second side of the damage surface, at most, as a share of that on both."""
+"""Area of a body on the second side of the damage surface, at most, as a share of the surface."""
 MOST_INTACT = 0.02
 """Share of the intact points that may lie on the lost bodies."""
 LEAST_DIFFERENCE = 0.1
@@ -46,16 +49,19 @@ def divide_part(part: Part, sheet: Sheet, intact: Floats, side: str, tolerance: 
     Raises NotSeparatedError where the surface does not divide the part; StageError where the side is not shown.
     """
     origin = part.bounds.mean(axis=0)
-    body = to_manifold(part, origin) - to_manifold(thicken(sheet.mesh, THIN * tolerance), origin)
+    body = to_manifold(part, origin) - to_manifold(_thicken(sheet.own, THIN * tolerance), origin)
+    loose = np.ones(len(sheet.mesh.faces), bool)
+    loose[: len(sheet.own.faces)] = _find_folds(sheet.own)
+    body -= _thicken_each(sheet.mesh.triangles[loose] - origin, 2 * THIN * tolerance)
     for wide in OPENED if len(sheet.places) else OPENED[:1]:
         bodies = (body - _make_balls(sheet.places - origin, wide * sheet.deep)).decompose()
         meshes = [Mesh(*to_arrays(one, origin)) for one in bodies]
         area = np.array([_measure_sides(mesh, sheet, tolerance) for mesh in meshes])
-        touched = area.sum(axis=1) > LEAST_AREA * sheet.mesh.area
-        if not (area[touched].min(axis=1) > MOST_BOTH * area[touched].sum(axis=1)).any():
+        if area.min(axis=1).max(initial=0.0) < MOST_BOTH * sheet.mesh.area:  # a pocket in a fold has both sides
             break
     else:
         raise NotSeparatedError("the damage surface does not divide the part in two", method="implicit")
+    touched = area.sum(axis=1) > LEAST_AREA * sheet.mesh.area
     front, back = touched & (area[:, 0] > area[:, 1]), touched & (area[:, 0] <= area[:, 1])
     if not front.any() or not back.any():
         raise NotSeparatedError("the damage surface cuts nothing off the part", method="implicit")
@@ -63,17 +69,32 @@ def divide_part(part: Part, sheet: Sheet, intact: Floats, side: str, tolerance: 
     return _unite(bodies, lost), _unite(bodies, ~lost)
 
 
-def thicken(sheet: Mesh, half: float) -> Mesh:
-    """A closed mesh that has the sheet in its middle and is ``2 half`` thick."""
-    normals = sheet.vertex_normals
-    count = len(sheet.vertices)
-    vertices = np.concatenate([sheet.vertices + half * normals, sheet.vertices - half * normals])
-    faces = [sheet.faces, sheet.faces[:, ::-1] + count]
-    for loop in trace_loops(sheet.faces):
+def _thicken(surface: Surface, half: float) -> Mesh:
+    """A closed mesh that has the surface in its middle and is ``2 half`` thick."""
+    away, count = half * surface.vertex_normals, len(surface.vertices)
+    vertices = np.concatenate([surface.vertices + away, surface.vertices - away])
+    walls = [surface.faces, surface.faces[:, ::-1] + count]
+    for loop in trace_loops(surface.faces):
         after = np.roll(loop, -1)
-        faces.append(np.stack([after, loop, loop + count], axis=1))
-        faces.append(np.stack([after, loop + count, after + count], axis=1))
-    return Mesh(vertices, np.concatenate(faces))
+        walls.append(np.stack([after, loop, loop + count], axis=1))
+        walls.append(np.stack([after, loop + count, after + count], axis=1))
+    return Mesh(vertices, np.concatenate(walls))
+
+
+def _find_folds(surface: Mesh) -> Flags:
+    """(F,) the faces that lean away from the normal at one of their corners: there `_thicken` is too thin, or inside
+    out."""
+    normal = normalise(surface.cross)
+    return np.asarray((np.einsum("fij,fj->fi", surface.vertex_normals[surface.faces], normal) < UPRIGHT).any(axis=1))
+
+
+def _thicken_each(triangles: Floats, half: float) -> Any:
+    """The union of all triangles (F,3,3), each ``half`` thicker all round: also right where they fold."""
+    from manifold3d import Manifold, OpType
+
+    octahedron = half * np.concatenate([np.eye(3), -np.eye(3)])
+    corners = (triangles[:, :, None] + octahedron).reshape(len(triangles), 18, 3)
+    return Manifold.batch_boolean([Manifold.hull_points(each) for each in corners] or [Manifold()], OpType.Add)
 
 
 def _make_balls(places: Floats, radius: Floats) -> Any:
@@ -93,7 +114,7 @@ def _make_balls(places: Floats, radius: Floats) -> Any:
 def _measure_sides(mesh: Mesh, sheet: Sheet, tolerance: float) -> tuple[float, float]:
     """The area of a body's faces on the front and on the back of the damage surface, without what extends it."""
     distance, face, _ = closest_on_mesh(mesh.triangles.mean(axis=1), sheet.mesh)
-    at = np.flatnonzero((distance < 3 * THIN * tolerance) & (face < sheet.own))
+    at = np.flatnonzero((distance < 3 * THIN * tolerance) & (face < len(sheet.own.faces)))
     own, other = mesh.cross[at], sheet.mesh.cross[face[at]]
     size = np.linalg.norm(own, axis=1)
     lean = np.einsum("ij,ij->i", own, other) / np.maximum(size * np.linalg.norm(other, axis=1), 1e-300)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from damageest.geometry.neighbourhoods import (
 from damageest.geometry.poisson import Grid, GridValues, refine_field
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.stages.enclose._loss_surface import build_surface
+from damageest.stages.enclose._side import find_behind
 from damageest.stages.enclose._skin import BESIDE, SkinSamples, find_held, look_at_skin, push_outward
 
 OF_SITE = 0.05
@@ -103,6 +104,9 @@ def sort_losses(
     free = skin.away < np.maximum(band * tolerance, BESIDE * skin.usual)
     asked = np.flatnonzero(free & (skin.away >= band * tolerance))
     free[asked[find_held(part, aligned, deviation, of_scan, skin, asked, tolerance)]] = False
+    behind = find_behind(part, aligned, deviation, points, label, grown, skin, tolerance)
+    free &= ~behind
+    skin = replace(skin, bare=skin.bare & ~behind)
     above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
     groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)
     kept = np.flatnonzero((lost_by < 0) & ~free)

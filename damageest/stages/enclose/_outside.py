@@ -11,10 +11,18 @@ from damageest.errors import StageError
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.vectors import normalise
 from damageest.stages.enclose._close import MOST_THROUGH, measure_through
-from damageest.stages.enclose._sew import extend_rims, fill_loops
+from damageest.stages.enclose._sew import ExtendedSurface, fill_loops, point_outward
 
 CLEAR = 0.3
 """How far outside the part the extended surface ends at least, in tolerances."""
+STEP = 0.5
+"""Distance of the places where the border is looked at, as a share of `CLEAR`."""
+FEWEST_NODES = 8
+"""Nodes of the outer border of a strip, at least."""
+LONGEST = 4
+"""Largest width of a strip where the rim is deep, for that where it is not."""
+UNFOLDED = 20
+"""How often nodes of that border are moved between their neighbours where it runs back."""
 ROUNDS = 8
 """How often a border is divided and moved where it still touches the part."""
 MOVES = 4
@@ -23,12 +31,15 @@ MOVES = 4
 
 @dataclass(frozen=True, eq=False)
 class Sheet:
-    """``mesh``: a damage surface, extended until it ends outside the part; its first ``own`` faces are the surface.
-    ``places`` (K,3) on its border that lie in the part all the same, and how far each is from the outside, ``deep``
-    (K,)."""
+    """``mesh``: a damage surface, extended until it ends outside the part; its first vertices and faces are those of
+    the surface itself, ``own``.
+
+    ``places`` (K,3) on its border that may lie in the part all the same, and the way ``deep`` (K,) of each to where it
+    is clear of the part.
+    """
 
     mesh: Mesh
-    own: int
+    own: Surface
     places: Floats
     deep: Floats
 
@@ -40,15 +51,15 @@ def extend_outside(surface: Surface, rims: Rims, part: Part, width: float, toler
     Lengths are in the part's unit. Raises StageError where there is no rim, or where what was added runs through more
     metal than a gap of the scan at the rim explains.
     """
-    wide = extend_rims(surface, rims, width)
-    vertices, faces, added = [wide.vertices], [fill_loops(wide)], [wide.faces[len(surface.faces) :]]
+    wide = _extend_rims(surface, rims, part, width)
+    vertices, faces, added = [wide.vertices], [fill_loops(wide)], []
     start, places = len(wide.vertices), []
     for loop in wide.loops:
         end, source = _leave_part(wide.vertices[loop], part, CLEAR * tolerance)
         vertices.append(end)
         added.append(_build_band(loop, start + np.arange(len(end)), source))
         faces.append(added[-1])
-        places.append(_trace(end, 0.5 * CLEAR * tolerance))
+        places.append(_trace(end, STEP * CLEAR * tolerance))
         start += len(end)
     sheet = Mesh(np.concatenate(vertices), np.concatenate(faces))
     share = measure_through(Mesh(sheet.vertices, np.concatenate(added)), part, tolerance) / max(surface.area, 1e-300)
@@ -60,8 +71,65 @@ def extend_outside(surface: Surface, rims: Rims, part: Part, width: float, toler
         )
     at = np.concatenate(places)
     deep = CLEAR * tolerance - signed_distance(at, part)[0]
-    still = np.flatnonzero(deep > CLEAR * tolerance)
-    return Sheet(sheet, len(surface.faces), at[still], deep[still])
+    still = np.flatnonzero(deep > (1 - STEP / 2) * CLEAR * tolerance)  # between two places it may lie in the part
+    return Sheet(sheet, surface, at[still], deep[still])
+
+
+def _extend_rims(surface: Surface, rims: Rims, part: Part, width: float) -> ExtendedSurface:
+    """The surface with a strip of about ``width`` along each rim, in the direction in which the surface ends there; of
+    more where the rim lies deep in the part.
+
+    The outer border has a node for every half width of the rim, so that it is smooth where the rim is jagged: a strip
+    that folds back does not divide.
+    """
+    if not rims.loops:
+        raise StageError("the damage surface has no rim to join to the background", method="implicit")
+    vertices, faces, ends = [surface.vertices], [surface.faces], []
+    start = len(surface.vertices)
+    for loop in rims.loops:
+        far, source = _place_border(surface, loop, part, width)
+        vertices.append(far)
+        ends.append(start + np.arange(len(far)))
+        faces.append(_build_band(ends[-1], loop, source)[:, ::-1])
+        start += len(far)
+    return ExtendedSurface(np.concatenate(vertices), np.concatenate(faces), tuple(ends))
+
+
+def _place_border(surface: Surface, loop: Ints, part: Part, width: float) -> tuple[Floats, Ints]:
+    """The nodes (M,3) of the outer border of a strip along a rim (N,), and for each node of the rim the number (N,) of
+    that which it is joined to; the numbers rise."""
+    at = surface.vertices[loop]
+    step = np.linalg.norm(np.roll(at, -1, axis=0) - at, axis=1)
+    place = np.cumsum(step) - step
+    count = int(np.clip(2 * step.sum() / width, FEWEST_NODES, len(loop)))
+    _, source = np.unique(place * count // step.sum(), return_inverse=True)
+    middle, out = (_average_groups(values, source) for values in (at, point_outward(surface, loop)))
+    out = normalise(out + 0.5 * (np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0)))
+    far, way = middle + _choose_widths(middle, out, part, width)[:, None] * out, np.roll(middle, -1, axis=0) - middle
+    for _ in range(UNFOLDED):
+        back = np.flatnonzero(np.einsum("ij,ij->i", np.roll(far, -1, axis=0) - far, way) <= 0)
+        if not len(back):
+            break
+        smooth = (np.roll(far, 1, axis=0) + np.roll(far, -1, axis=0)) / 2
+        nodes = np.union1d(back, (back + 1) % len(far))
+        far[nodes] = smooth[nodes]
+    return far, source
+
+
+def _choose_widths(middle: Floats, out: Floats, part: Part, width: float) -> Floats:
+    """For each node (M,3) the least multiple of ``width`` by which the way ``out`` (M,3) leads out of the part; the
+    width itself where none does."""
+    times = np.arange(1, LONGEST + 1)
+    ends = middle + width * times[:, None, None] * out
+    is_out = signed_distance(ends.reshape(-1, 3), part)[0].reshape(LONGEST, -1) > 0
+    chosen = np.where(is_out.any(axis=0), times[is_out.argmax(axis=0)], 1).astype(float)
+    return np.asarray(width * np.maximum(chosen, (np.roll(chosen, 1) + np.roll(chosen, -1)) / 2))
+
+
+def _average_groups(values: Floats, group: Ints) -> Floats:
+    """The means (M,3) of rows (N,3) by the number (N,) of their group."""
+    sums = np.stack([np.bincount(group, weights=column) for column in values.T], axis=1)
+    return np.asarray(sums / np.bincount(group)[:, None])
 
 
 def _trace(border: Floats, step: float) -> Floats:

@@ -33,8 +33,7 @@ def extend_rims(surface: Surface, rims: Rims, width: float) -> ExtendedSurface:
     start = len(surface.vertices)
     for loop in rims.loops:
         at = surface.vertices[loop]
-        along = np.roll(at, -2, axis=0) - np.roll(at, 2, axis=0)
-        out = normalise(np.cross(along, surface.vertex_cross[loop]))
+        out = point_outward(surface, loop)
         for _ in range(3):
             out = out + np.roll(out, 1, axis=0) + np.roll(out, -1, axis=0)
         out = normalise(out)
@@ -47,6 +46,13 @@ def extend_rims(surface: Surface, rims: Rims, width: float) -> ExtendedSurface:
         ends.append(new)
         start += len(loop)
     return ExtendedSurface(np.concatenate(vertices), np.concatenate(faces), tuple(ends))
+
+
+def point_outward(surface: Surface, loop: Ints) -> Floats:
+    """Unit vectors (N,3) at the nodes of a rim (N,): the direction in which the surface ends there."""
+    at = surface.vertices[loop]
+    along = np.roll(at, -2, axis=0) - np.roll(at, 2, axis=0)
+    return normalise(np.cross(along, surface.vertex_cross[loop]))
 
 
 def fill_loops(wide: ExtendedSurface) -> Ints:

@@ -146,12 +146,13 @@ WriteFunction = Callable[[Path, str, Sequence[Body], str], ExportedFiles]
 What the format cannot hold is left out, and a note says why."""
 
 
-ExactFunction = Callable[[Path, Result, Mapping[str, Body], Mapping[str, Floats | None], float], ExportedFiles]
-"""A function of ``folder, result, bodies, places, seconds`` that writes solids with the CAD's own faces.
+ExactFunction = Callable[[Path, Result, Mapping[str, Body], Mapping[str, Floats | None], float, float], ExportedFiles]
+"""A function of ``folder, result, bodies, places, seconds, budget`` that writes solids with the CAD's own faces.
 
 ``bodies``: what is to be written, by the stem of its file, in the part's frame; ``places``: the folders, as a prefix of
 the stem, with the transform (4,4) of a point from the part's frame, None for none; ``seconds``: the time limit for each
-site. Gives the files that it wrote; those of other bodies are then written as usual."""
+site, and ``budget`` for all of it, of the processor. Gives the files that it wrote; those of other bodies are then
+written as usual."""
 
 DocumentFunction = Callable[[Path, Result], ExportedFiles]
 """A function of ``folder, result`` that writes files about the whole result, in the part's frame. The same result gives

@@ -22,7 +22,7 @@ def check_paths(
     """What the writers of the formats ``names`` refuse, each with its place among the options: the machine, or the
     formats. What several formats refuse in the same words is one fault. ``templates``: files by the option that names
     them. ``planner``: the job's stage `path`; nothing is checked where it plans none and the job names no machine."""
-    plans = planner is not None and planner.use != "none"
+    plans = planner is not None and planner.plans_paths
     if not plans and settings.machine is None:
         return []
     channels: Sequence[str] = planner.list_channels() if plans else ()

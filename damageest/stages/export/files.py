@@ -59,6 +59,13 @@ class Files(Export):
         le=3600,
         description="longest time for the exact form of a site, in seconds of the processor; then it gets facets",
     )
+    exact_seconds: float = Field(
+        120.0,
+        gt=0,
+        le=36_000,
+        description="longest time for all exact forms of a run, in seconds of the processor; sites that it does not "
+        "reach get facets",
+    )
     frame: Literal["part", "scan", "both", "nominal", "all"] = Field(
         "part",
         description="frame of the files: part (of an adapted part, that of the adapted part), scan (as measured, files "
@@ -212,7 +219,7 @@ class Files(Export):
                 "that gives no field to move them by; take adapt: smooth, or adapt: none"
             )
             return ExportedFiles(notes=(note,), warnings=(note,))
-        return writer(folder, result, bodies, places, self.limit)
+        return writer(folder, result, bodies, places, self.limit, self.exact_seconds)
 
     def _write_surfaces(self, result: Result, folder: Path, place: str, T: Floats | None) -> list[ExportedFiles]:
         """Writes surfaces and scan below ``place``; ``T`` (4,4) takes a point from the part's frame to theirs."""

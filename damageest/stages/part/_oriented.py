@@ -7,17 +7,18 @@ from pathlib import Path
 
 import numpy as np
 
-from damageest.artefacts import Mesh, Scan
+from damageest.artefacts import Mesh, Scan, Vector
 from damageest.errors import InputError
 from damageest.geometry.units import canonical_unit, unit_factor
-from damageest.io.meshes import MESH_SUFFIXES, read_mesh
+from damageest.io.meshes import read_mesh
 from damageest.io.scans import make_scan, read_scan
+from damageest.io.triangles import MESH_SUFFIXES
 
 
-def read_oriented(paths: tuple[Path, ...], unit: str, source: str | None) -> Scan:
+def read_oriented(paths: tuple[Path, ...], unit: str, source: str | None, viewpoint: Vector | None = None) -> Scan:
     """The scan in files, in ``unit``, with normals where they can be known: those of the file, else toward the scanner,
     else by the triangles of a mesh. None where nothing tells them. Raises InputError where it cannot be read."""
-    scan = read_scan(paths, unit, source)
+    scan = read_scan(paths, unit, source, viewpoints=None if viewpoint is None else [viewpoint])
     if scan.normals is not None:
         return scan
     if scan.viewpoints is not None and scan.view is not None and (scan.view >= 0).all():

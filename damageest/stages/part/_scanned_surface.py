@@ -102,8 +102,8 @@ def _orient(scan: Scan, cloud: Floats, normals: Floats, voxel: float) -> Floats:
             return turn_outward(cloud, normals, voxel)
         except InputError as fault:
             raise InputError(
-                "the scan does not tell which side of its surface is metal; give a file with normals, with scanner "
-                f"positions, or a mesh ({fault})"
+                "the scan does not tell which side of its surface is metal; give a file with normals, part.viewpoint, "
+                f"a file with scanner positions, or a mesh ({fault})"
             ) from None
     index = find_neighbours(cloud, NEIGHBOURS, scan.points)[1]
     told = np.einsum("nkj,nj->n", scan.normals[index], normals)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import Literal, Self
 
-from pydantic import Field
+from pydantic import Field, FiniteFloat, model_validator
 
-from damageest.artefacts import Part
+from damageest.artefacts import Part, Vector
 from damageest.errors import InputError
 from damageest.geometry.units import UnitOption
 from damageest.io.files import files_sha256
@@ -31,6 +31,11 @@ class EarlierScan(ReadPart):
     unit: UnitOption | None = Field(
         None, description="unit of the files' lengths; default: the file's own (E57: m), else the job's `units`"
     )
+    viewpoint: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = Field(
+        None,
+        description="where the scanner stood for all points of a single file: [x, y, z] in the file's unit and frame; "
+        "default: what the file says",
+    )
     cell: float | None = Field(
         None, gt=0, description="resolution, in the job's unit; default: from the spacing and noise of the scan"
     )
@@ -41,18 +46,25 @@ class EarlierScan(ReadPart):
         description="largest number of grid cells; a default resolution is made coarser to meet it",
     )
 
+    @model_validator(mode="after")
+    def _check_viewpoint(self) -> Self:
+        if self.viewpoint is not None and not isinstance(self.path, Path):
+            raise ValueError("viewpoint: is for a single file; files of several views need their positions in them")
+        return self
+
     def run(self, unit: str) -> Part:
         """The part in ``unit``, in the frame of the earlier scan. ``tessellation_error``: how far the surface is off
         held-out points beyond their noise. Raises InputError where the scan does not tell inside from outside."""
         paths = (self.path,) if isinstance(self.path, Path) else self.path
-        return read_earlier(paths, unit, self.unit, self.cell, self.most_cells)
+        return read_earlier(paths, unit, self.unit, self.cell, self.most_cells, self.viewpoint)
 
 
 def read_earlier(
     paths: tuple[Path, ...], unit: str, source: str | None = None, cell: float | None = None,
-    most_cells: int = 8_000_000,
+    most_cells: int = 8_000_000, viewpoint: Vector | None = None,
 ) -> Part:  # fmt: skip
-    """The part that an earlier scan in files shows, in ``unit``; ``source``: the unit of the files, None: their own.
+    """The part that an earlier scan in files shows, in ``unit``; ``source``: the unit of the files, None: their own;
+    ``viewpoint``: where the scanner of a single file stood, in its unit and frame, None: what the file says.
 
     Raises InputError where they cannot be read, or the scan does not tell inside from outside.
     """
@@ -60,7 +72,7 @@ def read_earlier(
     from damageest.stages.part._scanned_surface import close_surface
 
     name = ", ".join(map(str, paths))
-    scan = read_oriented(paths, unit, source)
+    scan = read_oriented(paths, unit, source, viewpoint)
     if len(scan.points) < MIN_POINTS:
         raise InputError(f"{name}: {len(scan.points)} points are too few for a part; at least {MIN_POINTS} are needed")
     try:

@@ -8,8 +8,8 @@ from pydantic import Field
 
 from damageest.artefacts import Part
 from damageest.geometry.units import UnitOption
-from damageest.io.meshes import MESH_SUFFIXES
 from damageest.io.parts import read_part
+from damageest.io.triangles import MESH_SUFFIXES
 from damageest.stages import JobPath
 from damageest.stages.part import ReadPart
 

@@ -57,6 +57,8 @@ class Path(Stage, ABC):
 
     stage: ClassVar[str] = "path"
     gives: ClassVar[str] = "path"
+    plans_paths: ClassVar[bool] = True
+    """Whether it gives paths at all."""
     per_site: ClassVar[bool] = True
 
     @asked_by_name

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import ClassVar, Literal
 
 from damageest.artefacts import DepositPath
 from damageest.stages.path import Path
@@ -12,6 +12,7 @@ class NoPath(Path):
     """Plans no passes; the deposit goes to another program as a solid."""
 
     use: Literal["none"] = "none"
+    plans_paths: ClassVar[bool] = False
 
     def run(self) -> DepositPath | None:
         """None: there are no passes."""

@@ -8,7 +8,7 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Floats, Ints, Part, Surface
-from damageest.geometry.open_surfaces import centre_points, choose_cell, orient_points, trim_surface
+from damageest.geometry.open_surfaces import centre_points, choose_cell, draw_to_points, orient_points, trim_surface
 from damageest.stages.reconstruct import Reconstruct
 
 
@@ -16,7 +16,7 @@ class SignedDistance(Reconstruct):
     """The zero level of the signed distance to oriented points, after Curless and Levoy 1996 (paper 3.1 step 5).
 
     By VTK (vtkSignedDistance and vtkExtractSurface): the distance is the weighted mean of the heights over the tangent
-    planes of nearby points.
+    planes of nearby points. Over a hollow that mean is too deep; the surface is drawn back to the points.
     """
 
     modules: ClassVar[tuple[str, ...]] = ("pyvista",)
@@ -31,8 +31,8 @@ class SignedDistance(Reconstruct):
         2.0,
         ge=1.5,
         le=8,
-        description="how far from a point the distance is computed, in cells; a larger radius bridges wider gaps, but "
-        "shifts a surface of curvature radius R by up to radius^2 / 4R",
+        description="how far from a point the distance is computed, in cells; a larger radius bridges wider gaps, and "
+        "rounds what is more curved",
     )
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:
@@ -46,7 +46,8 @@ class SignedDistance(Reconstruct):
         vertices, faces = _extract_zero_level((cloud - origin) @ axes, normals @ axes, cell, self.radius * cell)
         if np.linalg.det(axes) < 0:
             faces = faces[:, ::-1]
-        return trim_surface(vertices @ axes.T + origin, faces, cloud, 1.4 * cell, part, tolerance)
+        vertices = draw_to_points(vertices @ axes.T + origin, faces, cloud, normals)
+        return trim_surface(vertices, faces, cloud, 1.4 * cell, part, tolerance)
 
 
 def _extract_zero_level(points: Floats, normals: Floats, cell: float, radius: float) -> tuple[Floats, Ints]:

@@ -75,6 +75,7 @@ def _tabulate(result: Result) -> str:
     total = f"damage volume {style.format_number(result.damage_volume)} {unit}³"
     interval = show_total_interval(result)
     total += f" (95 %: {interval})" if interval else ""
+    total += f"; {told}" if (told := result.describe_volumes()) else ""
     seen = f"; the scan shows {style.format_share(result.coverage.seen)} of the skin" if result.coverage else ""
     said = f"{total}; tolerance {style.format_number(result.tolerance)} {unit}{seen}"
     top = "<tr>" + "".join(f'<th style="{CELL};color:#6a757d">{head}</th>' for head in heads) + "</tr>"

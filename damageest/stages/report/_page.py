@@ -85,6 +85,7 @@ def fill_page(
         heights=max((item["height"] for item in scene.objects), default=0),
         verdict=describe_run(result),
         tone=choose_tone(result),
+        volumes=result.describe_volumes(),
         total=f"{style.format_number(result.damage_volume)} {result.units}³",
         interval=show_total_interval(result),
         scene=scene,

@@ -111,6 +111,14 @@ def _draw_head(pen: Any, book: Book) -> None:
     pen.restoreState()
 
 
+def _list_volumes(result: Result) -> list[tuple[str, float]]:
+    """Lost metal, cut-back and stock, where there is more than the first."""
+    if not result.describe_volumes():
+        return []
+    more = (("cut-back", result.cut_back_volume), ("stock", result.stock_volume))
+    return [("lost metal", result.lost_volume), *((name, volume) for name, volume in more if volume > 0)]
+
+
 def _summarise(book: Book, image: bytes) -> list[Any]:
     result, content, tell, number = book.result, book.content, book.words.tell, book.words.number
     cubic = f"{book.unit}³"
@@ -119,6 +127,7 @@ def _summarise(book: Book, image: bytes) -> list[Any]:
         (tell("scan"), _name_scans(book)),
         (tell("damage volume"), f"{number(result.damage_volume)} {cubic}"),
         (tell("95 % interval"), book.interval(result.volume_95, cubic)),
+        *((tell(name), f"{number(volume)} {cubic}") for name, volume in _list_volumes(result)),
         (tell("tolerance"), f"{number(result.tolerance, 3)} {book.unit}"),
     ]
     if result.coverage is not None:

@@ -68,6 +68,11 @@ class ReadScan(Stage, ABC):
         description="points to keep or to drop, one crop after the other; in the scan's own frame, in the job's unit",
     )
 
+    @property
+    def finds_scale(self) -> bool:
+        """Whether a scan that is larger or smaller than the part is to be scaled by the factor that fits best."""
+        return False
+
     @asked_by_name
     @abstractmethod
     def run(self, unit: str, part: Part) -> Scan: ...
@@ -75,4 +80,9 @@ class ReadScan(Stage, ABC):
     def read_pieces(self, unit: str) -> Iterator[Scan]:
         """All points in pieces, where ``run`` gives only some of them (``total`` of its scan is above 0); the pipeline
         takes those near damage from here, twice. Points as ``run`` gives them, without normals."""
+        return iter(())
+
+    def read_otherwise(self, unit: str) -> Iterator[Scan]:
+        """The same files as they may be meant besides, where they leave open what they mean, as text whose columns
+        nothing names; ``columns`` of each scan says how. The pipeline asks where the scan is not of the part's size."""
         return iter(())

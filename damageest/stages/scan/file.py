@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, ClassVar, Literal, Self
@@ -115,6 +116,10 @@ class ScanFile(ReadScan):
                 )
         return self
 
+    @property
+    def finds_scale(self) -> bool:
+        return self.scale == "auto"
+
     def run(self, unit: str) -> Scan:
         """The points in ``unit``, the job's. Raises InputError for a file that cannot be read or has no points."""
         if large := self._open_large(unit):
@@ -140,6 +145,19 @@ class ScanFile(ReadScan):
     def read_pieces(self, unit: str) -> Iterator[Scan]:
         large = self._open_large(unit)
         return iter(()) if large is None else large.read()
+
+    def read_otherwise(self, unit: str) -> Iterator[Scan]:
+        """The scan with x, y and z in other columns of text files; nothing where the job or the files say which."""
+        from damageest.io.points.text import list_other_columns
+
+        files = self._list_files()
+        paths, places = [file.path for file in files], [file.viewpoint for file in files]
+        if self.columns or any(READERS.get(path.suffix.lower()) != "text" for path in paths):
+            return
+        for columns in list_other_columns(paths[0]):
+            with suppress(InputError):  # such as of other files with fewer columns
+                scan = read_scan(paths, unit, self.unit, columns, places, self.min_confidence)
+                yield replace(self._note_folders(scan), columns=(columns,))
 
     def _open_large(self, unit: str) -> LargeScan | None:
         if not self.most_points:

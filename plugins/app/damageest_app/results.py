@@ -14,6 +14,8 @@ from damageest.io.colours import colour_site
 from damageest.output.folder import OutputFolder, open_output
 
 LEVELS = ("proven", "likely", "doubtful")
+MUCH = 0.05
+"""Share of a deposit that a path leaves out, or adds, from which that is said in red."""
 Json = Mapping[str, Any]
 
 
@@ -89,6 +91,8 @@ class Results:
         """What the whole run says, in lines."""
         content, unit = self.content, self.unit
         lines = [f"damage {content['damage_volume']:.5g} {unit}³ (95 %: {format_interval(content['volume_95'])})"]
+        if told := self._describe_volumes():
+            lines.append(told)
         if content.get("coverage"):
             lines.append(
                 f"tolerance {self.tolerance:.4g} {unit}; {content['coverage']['seen']:.0%} of the skin is seen"
@@ -96,6 +100,20 @@ class Results:
         if content.get("fit"):
             lines.append(f"fit: {content['fit']['words']}")
         return lines
+
+    def _describe_volumes(self) -> str:
+        """Lost metal, cut-back and stock, where there is more than the first."""
+        material, files = self.content["material"], self.content["export"]["files"]
+        milled = {int(Path(name).stem.removeprefix("site-")) for name in files if name.startswith("milled/site-")}
+        within = sum(
+            site["deposit"]["cut_back_volume"]
+            for site in self.content["sites"]
+            if site.get("deposit") and site["id"] not in milled  # metal that `prepare` mills off is in no damage volume
+        )
+        more = [("cut-back", material["cut_back_volume"]), ("stock", material["stock_volume"])]
+        told = [f"{name} {volume:.4g} {self.unit}³" for name, volume in more if volume > 0]
+        lost = f"lost metal {self.content['damage_volume'] - within:.4g} {self.unit}³"
+        return ", ".join([lost, *told]) if told else ""
 
     def list_notes(self) -> list[dict[str, str]]:
         """What the run noted, and what failed."""
@@ -116,6 +134,28 @@ class Results:
         for site in self.content["sites"]:
             names = (site.get("path") or {}).get("files", [])
             found += [(site["id"], self.output.folder / name) for name in names if name.endswith(".csv")]
+        return found
+
+    def list_path_faults(self) -> list[dict[str, Any]]:
+        """What the paths leave out or add, site by site: ``text``; ``is_much``: whether more than `MUCH` of a deposit
+        is not filled, so that no one takes the path to a machine unaware of it."""
+        found = []
+        for site in self.content["sites"]:
+            path = site.get("path") or {}
+            whole = float(path.get("deposit_volume") or 0.0)
+            if not whole:
+                continue
+            filled = (path.get("fill") or {}).get("of_deposit")
+            left = float(path["unreachable_volume"]) / whole if filled is None else 1 - float(filled)
+            parts = [f"{one['volume']:.3g} {self.unit}³ {one['why']}" for one in path["unreached"]]
+            extra = float(path.get("surplus_volume") or 0.0) / whole
+            if extra > MUCH:
+                parts.append(f"the passes add {extra:.0%} more than what they reach")
+            if left > MUCH or parts:
+                text = f"site {site['id']}: {left:.1%} of the deposit is not filled"
+                found.append({"text": "; ".join([text, *parts]), "is_much": left > MUCH})
+            notes = [str(one["text"]) for one in site.get("warnings", ()) if one["code"] == "path"]
+            found += [{"text": f"site {site['id']}: {note}", "is_much": False} for note in notes]
         return found
 
     def list_files(self) -> list[str]:

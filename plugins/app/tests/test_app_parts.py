@@ -138,6 +138,7 @@ def test_a_unit_that_is_put_right_drops_the_tolerance_that_was_measured_in_the_o
     assert edits.plain(tree) == {"tolerance": "auto", "scan": {"path": "scan.xyz", "unit": "in"}}
 
 
+@pytest.mark.slow
 def test_a_command_that_fails_says_why_and_one_that_ends_leaves_no_process(tmp_path: Path) -> None:
     runner = Runner()
     outcome = runner.call(["run", "missing.yaml", "--quiet"], tmp_path)
@@ -175,3 +176,43 @@ def test_part_and_scan_are_chosen_where_there_is_no_choice(
     for name in names:
         (tmp_path / name).write_text("")
     assert guess_inputs(Folder.open(tmp_path, registry).list_files()) == found
+
+
+def test_what_a_path_leaves_out_is_told_in_red_from_a_twentieth() -> None:
+    from types import SimpleNamespace
+
+    from damageest_app.results import Results
+
+    def path(volume: float, why: str) -> dict[str, object]:
+        return {
+            "deposit_volume": 2200.0, "unreachable_volume": volume, "surplus_volume": 1144.0,
+            "unreached": [{"volume": volume, "why": why}], "fill": None,
+        }  # fmt: skip
+
+    note = [{"code": "path", "text": "the nozzle is near the flange"}, {"code": "enclose", "text": "other"}]
+    sites = [
+        {"id": 1, "path": path(332.0, "not reached"), "warnings": note},
+        {"id": 2, "path": path(22.0, "narrower than a bead"), "warnings": []},
+        {"id": 3, "path": None, "warnings": []},
+    ]
+    told = Results.list_path_faults(SimpleNamespace(content={"sites": sites}, unit="mm"))  # type: ignore[arg-type]
+    assert [one["is_much"] for one in told] == [True, False, False]
+    assert told[0]["text"].startswith("site 1: 15.1% of the deposit is not filled; 332 mm³ not reached; ")
+    assert "the passes add 52% more" in told[0]["text"]
+    assert told[1]["text"] == "site 1: the nozzle is near the flange"
+
+
+def test_the_link_to_the_zip_downloads_and_does_not_leave_the_app() -> None:
+    """A link without the attribute `download` takes the page, and with it the connection, away."""
+    import inspect
+
+    from damageest_app.panels import repair
+    from damageest_app.panels.marks import mark
+    from trame.app import get_server
+    from trame.ui.vuetify3 import VAppLayout
+    from trame.widgets import vuetify3 as v3
+
+    assert "download=True" not in inspect.getsource(repair), "trame drops what it does not know"
+    with VAppLayout(get_server("zip", client_type="vue3")) as layout:
+        v3.VBtn("zip", href="/download", raw_attrs=mark("download", "download"))
+    assert " download" in layout.html.replace('data-test="download"', "").replace('"/download"', "")

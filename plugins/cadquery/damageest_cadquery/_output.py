@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,11 +15,12 @@ from damageest_cadquery._deposit import STOCK
 from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._exact import scale_shape
 from damageest_cadquery._files import join_shapes, write_shapes
+from damageest_cadquery._kept import keep_made
 from damageest_cadquery._left import FACET, cut_facets
 from damageest_cadquery._opened import FOUND
 from damageest_cadquery._planar import build_solid
 from damageest_cadquery._read import explore
-from damageest_cadquery._request import CadFacts, Request, name_file
+from damageest_cadquery._request import SPENT, CadFacts, Made, Request, name_file
 from damageest_cadquery._sites import Solved, describe_exact
 from damageest_cadquery._solids import StockError
 from damageest_cadquery._split import Piece
@@ -33,7 +35,7 @@ PLAIN: Colour = (150, 155, 165)
 @dataclass(eq=False)
 class Writing:
     """What was written so far. ``solved``: what was found, by site; ``faults``: why files of it were not written, by
-    the stem of the file; ``notes``: what is to be said of files."""
+    the stem of the file; ``notes``: what is to be said of files; ``before``: what earlier processes wrote."""
 
     request: Request
     facts: CadFacts
@@ -41,6 +43,7 @@ class Writing:
     faults: dict[str, str] = field(default_factory=dict)
     files: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    before: Made = field(default_factory=lambda: Made((), (), {}))
 
     def describe(self, number: int) -> ExactForm:
         """What is to be said of a site's solids, as they were written."""
@@ -66,17 +69,34 @@ class Writing:
         if fault := request.skipped.get(file):
             self.notes.append(f"{file} was not written with the CAD's faces: {fault}")
             return (), fault
+        if file in self.before.files:  # by an earlier process, and valid
+            return shapes, ""
+        if time.process_time() > request.left:
+            return (), SPENT
+        self._keep()
         path = Path(request.folder) / file
         path.parent.mkdir(parents=True, exist_ok=True)
-        with at_work(file, request.seconds):
+        with at_work(file, request.allow(request.seconds)):
             scratch, chord = Path(request.scratch) / "a.step", request.tolerance / request.enlarged / 16
             done = write_shapes(scratch, path, name, shapes, request.unit, chord)
         if done.said:
             self.notes.append(f"{file} {done.said}")
-        if done.made is None:
-            return (), done.fault
-        self.files.append(file)
-        return done.made, ""
+        if done.made is not None:
+            self.files.append(file if done.is_valid else f"{stem}-invalid.step")
+        self._keep()
+        return (done.made, "") if done.made is not None and done.is_valid else ((), done.fault)
+
+    def _keep(self) -> None:
+        if self.request.keep:
+            keep_made(self.request.keep, self.tell())
+
+    def tell(self) -> Made:
+        """What was written so far."""
+        return Made(
+            tuple(self.files),
+            tuple(dict.fromkeys(self.notes)),
+            {number: self.describe(number) for number in self.solved},
+        )
 
 
 def write_all(writing: Writing, rest: Sequence[Piece]) -> None:

@@ -17,6 +17,7 @@ class Model:
     """``solids``: OpenCASCADE shapes. ``unit``: the file's, None where it has none. ``length``: how many of
     OpenCASCADE's units of length are one of the file's. ``name_of`` gives a face's name in the file, or '';
     ``entity_of`` says which of the ADVANCED_FACE entities of a STEP file it is, from 0 in the file's order, or -1.
+    ``closed``: the largest gap between surfaces that was closed, in OpenCASCADE's lengths; 0 where none was.
     """
 
     solids: list[Any]
@@ -26,11 +27,16 @@ class Model:
     notes: tuple[str, ...]
     solid_names: tuple[str, ...]
     entity_of: Callable[[Any], int]
+    closed: float = 0.0
 
 
-def read(path: Path, suffix: str) -> Model:
-    """The solids of a file. Raises InputError where it is unreadable or holds no solid, even sewn together, PluginError
-    where a system library that OpenCASCADE loads is missing."""
+def read(path: Path, suffix: str, gap: float | None = None) -> Model:
+    """The solids of a file. ``gap``: between surfaces that is closed at most, in OpenCASCADE's lengths, where the file
+    holds no solid; None: a thousandth of the part.
+
+    Raises InputError where it is unreadable or holds no solid, even sewn together, PluginError where a system library
+    that OpenCASCADE loads is missing.
+    """
     check()
     from OCP.Message import Message
 
@@ -39,9 +45,11 @@ def read(path: Path, suffix: str) -> Model:
     shape, unit, name_of, entity_of = reader(path)
     if shape is None or shape.IsNull():
         raise InputError("holds no shape; export the part again as a solid")
-    solids, notes = _solids(shape)
+    length = MILLIMETRES[unit] if unit else 1.0
+    solids, closed = _solids(shape, gap)
+    notes = () if closed is None else (_describe_closed(closed / length, unit or ""),)
     names = tuple(name_of(solid) for solid in solids)
-    return Model(solids, unit, MILLIMETRES[unit] if unit else 1.0, name_of, notes, names, entity_of)
+    return Model(solids, unit, length, name_of, notes, names, entity_of, closed or 0.0)
 
 
 def read_shape(path: Path) -> Any:
@@ -145,35 +153,26 @@ def _unit(name: str) -> str | None:
         return None
 
 
-def _solids(shape: Any) -> tuple[list[Any], tuple[str, ...]]:
+def _solids(shape: Any, gap: float | None) -> tuple[list[Any], float | None]:
+    """The solids of a shape, and the largest gap between surfaces that was closed to make them; None where it has
+    solids."""
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SOLID
 
     solids = [solid for solid in explore(shape, TopAbs_SOLID) if explore(solid, TopAbs_FACE)]
     if solids:
-        return solids, ()
+        return solids, None
     if not explore(shape, TopAbs_FACE):
         raise InputError("holds neither solids nor faces, perhaps only points and curves; export the part as a solid")
-    return _sewn(shape), ("the file holds surfaces only: they were sewn together into a solid",)
+
+    from damageest_cadquery._sew import sew
+
+    return sew(shape, gap)
 
 
-def _sewn(shape: Any) -> list[Any]:
-    from OCP.BRep import BRep_Tool
-    from OCP.BRepBuilderAPI import BRepBuilderAPI_Sewing
-    from OCP.ShapeFix import ShapeFix_Solid
-    from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
-    from OCP.TopoDS import TopoDS
-
-    sewing = BRepBuilderAPI_Sewing(1e-3)
-    for face in explore(shape, TopAbs_FACE):
-        sewing.Add(face)
-    sewing.Perform()
-    shells = [TopoDS.Shell_s(shell) for shell in explore(sewing.SewedShape(), TopAbs_SHELL)]
-    if not shells or not all(BRep_Tool.IsClosed_s(shell) for shell in shells):
-        raise InputError(
-            f"holds surfaces only, no solid; sewn together they leave {sewing.NbFreeEdges()} open edges; "
-            "export the part as a solid"
-        )
-    return [ShapeFix_Solid().SolidFromShell(shell) for shell in shells]
+def _describe_closed(gap: float, unit: str) -> str:
+    """A note of what was sewn. ``gap``: the largest that was closed, in ``unit``."""
+    sewn = "the file holds surfaces only: they were sewn together into a solid"
+    return f"{sewn}, over gaps between them of up to {gap:.2g} {unit}".rstrip() if gap else sewn
 
 
 def find_box(shapes: Iterable[Any]) -> Any:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
+import math
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -21,7 +23,9 @@ class Request:
     the stem of its file, for the assembly, which ``assembly`` asks for; ``field``: what moves the part as designed, as
     its CAD file has it, to ``part``, None for nothing; ``seconds``: processor time that each piece of work has;
     ``skipped``: those that stopped this process before, by `name_site`, `name_form`, `name_deposit` and `name_file`,
-    and why. ``enlarged``: all lengths, but those of ``places``, are millimetres times this.
+    and why. ``enlarged``: all lengths, but those of ``places``, are millimetres times this. ``keep``: the folder of
+    what earlier processes have found, empty for none. ``left``: processor seconds that this process has for everything,
+    and ``solving``, until it begins no further site.
     """
 
     part: Part
@@ -38,6 +42,15 @@ class Request:
     enlarged: float = 1.0
     field: DisplacementField | None = None
     skipped: Mapping[str, str] = dataclasses.field(default_factory=dict)
+    keep: str = ""
+    left: float = math.inf
+    solving: float = math.inf
+
+    def allow(self, seconds: float, share: float | None = None) -> float:
+        """How much of ``seconds`` of the processor a piece of work may take now. ``share``: what all work up to it may
+        take; by default all that this process has."""
+        left = (self.left if share is None else share) - time.process_time()
+        return max(min(seconds, left), LEAST)
 
 
 @dataclass(frozen=True)
@@ -49,6 +62,9 @@ class Made:
     forms: Mapping[int, ExactForm]
 
 
+LEAST = 0.5
+"""Processor seconds that a piece of work has at least: it is ended at once where there is no time left."""
+SPENT = "the time for exact forms (export.exact_seconds) was used up"
 WHOLE = "the CAD file"
 """The work between the others, such as reading."""
 ADAPTING = "the CAD faces of the adapted part"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,6 +19,7 @@ from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit, refus
 from damageest_cadquery._exact import Exact, SiteInput, find_exact
 from damageest_cadquery._opened import ExactMilled, find_milled, take_opened
 from damageest_cadquery._request import (
+    SPENT,
     CadFacts,
     Request,
     describe_missing,
@@ -81,18 +83,19 @@ class SiteWork:
         request = self.request
         if fault := request.skipped.get(name):
             return None, (fault,)
-        with at_work(name, request.seconds):
+        if time.process_time() > request.solving:
+            return None, (SPENT,)
+        seconds = request.allow(request.seconds, request.solving)
+        with at_work(name, seconds):
             watch = partial(_watch, request, name)
-            return find_exact(
-                site, around, self.faces, request.part, request.tolerance, self.off, watch, request.seconds
-            )
+            return find_exact(site, around, self.faces, request.part, request.tolerance, self.off, watch, seconds)
 
     def _explain(self, site: SiteInput, last: str) -> str:
         """Why a damage volume has no exact form, with the faces that it lies on."""
         request, names = self.request, self.facts.names
-        if name_site(site.number) in request.skipped:
+        if name_site(site.number) in request.skipped or time.process_time() > request.solving:
             return last
-        with at_work(name_crossed(site.number), request.seconds):
+        with at_work(name_crossed(site.number), request.allow(request.seconds, request.solving)):
             skipped = name_crossed(site.number) in request.skipped
             crossed = [] if skipped else find_crossed(self.solids, self.faces, site.damage, request.tolerance)
         told = f"{last}; it lies on {_tell_faces(site, request.part, names)}"
@@ -105,8 +108,10 @@ class SiteWork:
         try:
             if fault := request.skipped.get(name):
                 raise StockError(fault, _list_stock(deposit))
+            if time.process_time() > request.solving:
+                raise StockError(SPENT)
             refuse_doubles(deposit, exact.pieces, exact.doubles)
-            with at_work(name, request.seconds):
+            with at_work(name, request.allow(request.seconds, request.solving)):
                 made = find_deposit(
                     deposit, cavity, exact.pieces, exact.rest, self.faces, request.part, request.tolerance
                 )
@@ -125,7 +130,9 @@ class SiteWork:
                 raise StockError("its damage volume has facets too")
             if fault := request.skipped.get(name):
                 raise StockError(fault)
-            with at_work(name, request.seconds):
+            if time.process_time() > request.solving:
+                raise StockError(SPENT)
+            with at_work(name, request.allow(request.seconds, request.solving)):
                 made = find_milled(cavity, exact, site.deposit, request.part, request.tolerance)
         except StockError as error:
             return None, _describe_milled(cavity, None, str(error), request.enlarged)
@@ -136,8 +143,9 @@ class SiteWork:
 def _watch(request: Request, whose: str, form: str) -> Iterator[str]:
     """While a form of a damage volume or a cavity is tried: a crash, or too much time, costs this form alone."""
     name = name_form(whose, form)
-    with at_work(name, limit_form(request.seconds)):
-        yield request.skipped.get(name, "")
+    late = SPENT if time.process_time() > request.solving else ""
+    with at_work(name, request.allow(limit_form(request.seconds), request.solving)):
+        yield request.skipped.get(name, late)
 
 
 def _list_stock(deposit: Solid) -> list[int]:

@@ -14,14 +14,16 @@ from pathlib import Path
 from typing import Any
 
 from damageest.artefacts import Solid
-from damageest.errors import InputError, StageError
+from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
-from damageest.isolation import call_isolated
+from damageest.isolation import Limits, ProcessError, call_isolated, tell_part
 from damageest.stages.export import Body, ExportedFiles
 from damageest_cadquery._header import set_header
 from damageest_cadquery._planar import build_shape, count_faces, find_shells, split_solids
 
 UNITS = {"um": "UM", "mm": "MM", "cm": "CM", "m": "M", "in": "INCH", "ft": "FT"}
+FACET_SECONDS = 60.0
+"""Longest time of the processor to write one file with facets, or a spline, and to read it back."""
 MAX_FACES = 100_000
 """Largest number of planar faces in a STEP file; 60,000 took 11 s to write, 22 s to read, and 67 MB."""
 
@@ -40,11 +42,13 @@ class Way:
 @dataclass(frozen=True, eq=False)
 class Outcome:
     """``made``: what was written, None where there is no file. ``said``: what is to be said of the file, in words that
-    follow its name; empty where the first way served. ``fault``: why the first way did not."""
+    follow its name; empty where the first way served. ``fault``: why the first way did not. ``is_valid``: False
+    where the file is one that other programs may refuse."""
 
     made: Any
     said: str = ""
     fault: str = ""
+    is_valid: bool = True
 
 
 class TooManyFacesError(Exception):
@@ -55,6 +59,7 @@ def write_step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Ex
     """Writes one solid as faceted STEP. With too many faces, or where it cannot be read back, the file is left out, and
     a note says so."""
     (body,) = solids
+    tell_part(f"STEP with facets: {stem}.step")
     try:
         said = call_in_process(write_facets, folder / f"{stem}.step", body.solid, body.name, unit, MAX_FACES)
     except TooManyFacesError as error:
@@ -63,17 +68,26 @@ def write_step(folder: Path, stem: str, solids: Sequence[Body], unit: str) -> Ex
             "set a larger  detail , or use 3mf"
         )
         return ExportedFiles(notes=(note,))
-    except StageError as error:
+    except ProcessError as error:
         said = f"was not written: the process that writes it {error.message}"
+        if error.why == "time":
+            said = (
+                f"was not written: with facets, OpenCASCADE takes longer than {FACET_SECONDS:g} s of the processor to "
+                "write and read it; set a larger  detail , or use 3mf"
+            )
     notes = (f"{stem}.step {said}",) if said else ()
-    return ExportedFiles((f"{stem}.step",) if (folder / f"{stem}.step").is_file() else (), notes, warnings=notes)
+    files = tuple(name for name in (f"{stem}.step", f"{stem}-invalid.step") if (folder / name).is_file())
+    return ExportedFiles(files, notes, warnings=notes)
 
 
 def call_in_process(function: Callable[..., str], path: Path, *values: Any) -> str:
     """What ``function`` gives for a scratch file, ``path`` and the ``values``, called in a process of its own."""
     with tempfile.TemporaryDirectory(prefix="damageest-step-") as place:
         arguments = {"scratch": Path(place) / "a.step", "path": path, "values": values}
-        return call_isolated(_call, {"function": function, **arguments}, worker="damageest_cadquery step", owner=OWNER)
+        return call_isolated(
+            _call, {"function": function, **arguments}, worker="damageest_cadquery step", owner=OWNER,
+            limits=Limits(seconds=FACET_SECONDS), processor_time=True,
+        )  # fmt: skip
 
 
 OWNER = "damageest-cadquery"
@@ -113,9 +127,9 @@ def write_facets(scratch: Path, path: Path, solid: Solid, name: str, unit: str, 
 def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequence[float] = ()) -> Outcome:
     """Writes a file in the first of several ways in which it holds what it is to hold when it is read back.
 
-    Where there is none, the first complete one is taken, though OpenCASCADE divides its solids in another way or
-    finds them not valid; else there is no file. ``scratch``: where files are written and read back; ``volumes``: of the
-    solids, where they are known better than from the shape.
+    Where there is none, the first complete one gets the name that `mark_invalid` gives, since OpenCASCADE divides its
+    solids in another way or finds them not valid; else there is no file. ``scratch``: where files are written and read
+    back; ``volumes``: of the solids, where they are known better than from the shape.
     """
     from damageest_cadquery._readback import COMPLETE, find_fault  # imported late: the caller does not need it
 
@@ -143,11 +157,17 @@ def write_first(scratch: Path, path: Path, ways: Iterable[Way], volumes: Sequenc
         faults.append(fault)
         if fault.endswith(COMPLETE) and doubtful.made is None:
             shutil.move(scratch, spare)
-            doubtful = Outcome(made, f"may be refused by other programs: read back, {fault}", fault)
+            told = f"is called {mark_invalid(path).name}, since other programs may refuse it: read back, {fault}"
+            doubtful = Outcome(made, told, fault, is_valid=False)
     if doubtful.made is None:
         return Outcome(None, f"was not written: read back, {faults[0]}", faults[0])
-    shutil.move(spare, path)
+    shutil.move(spare, mark_invalid(path))
     return doubtful
+
+
+def mark_invalid(path: Path) -> Path:
+    """The name of a file that other programs may refuse: no one takes it for the one that was asked for."""
+    return path.with_name(f"{path.stem}-invalid{path.suffix}")
 
 
 def write_shape(path: Path, shape: Any, name: str, unit: str, curves: bool = False) -> None:

@@ -11,6 +11,7 @@ from damageest_cadquery._claims import lower_claims
 from damageest_cadquery._colours import read_colours
 from damageest_cadquery._exact import scale_shape, start_solids
 from damageest_cadquery._files import join_shapes
+from damageest_cadquery._kept import find_made, find_solved, keep_solved
 from damageest_cadquery._moved import MoveError
 from damageest_cadquery._output import Writing, write_all
 from damageest_cadquery._read import Model, explore, read
@@ -24,7 +25,7 @@ CLAIMS = 0.01
 def make_exact(request: Request) -> Made:
     """Finds the exact forms and writes the files. It notes what is at work, so that where it stops, it can be started
     again without that."""
-    with at_work(WHOLE, request.seconds):
+    with at_work(WHOLE, request.allow(request.seconds)):
         return _make(request)
 
 
@@ -47,11 +48,15 @@ def _make(request: Request) -> Made:
     work = SiteWork(request, solids, faces, facts, cad.off)
     rest, solved = solids, {}
     for site in request.sites:
-        found = solved[site.number] = work.solve(site, rest if site.accepted else solids)
+        kept = find_solved(request.keep, site.number)
+        found = solved[site.number] = kept or work.solve(site, rest if site.accepted else solids)
+        if request.keep and not kept:
+            keep_solved(request.keep, site.number, found)
         rest = found.exact.rest if found.exact is not None and site.accepted else rest
-    writing = Writing(request, facts, solved)
+    before = find_made(request.keep)
+    writing = Writing(request, facts, solved, {}, list(before.files), list(before.notes), before)
     write_all(writing, rest)
-    return Made(tuple(writing.files), tuple(writing.notes), {number: writing.describe(number) for number in solved})
+    return writing.tell()
 
 
 def take_solids(model: Model, request: Request) -> MovedSolids:
@@ -61,7 +66,7 @@ def take_solids(model: Model, request: Request) -> MovedSolids:
     shapes = [scale_shape(solid, scale) if abs(scale - 1) > 1e-12 else solid for solid in model.solids]
     if request.field is None:
         return MovedSolids([lower_claims(shape, CLAIMS * request.tolerance) for shape in shapes], 0.0)
-    with at_work(ADAPTING, request.seconds):
+    with at_work(ADAPTING, request.allow(request.seconds)):
         return move_solids(shapes, request.field, request.part, request.tolerance)
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from pydantic import Field
 
@@ -16,6 +16,9 @@ from damageest.geometry.units import FARTHEST, UnitOption, canonical_unit, unit_
 from damageest.io.files import check_file, file_sha256, raise_environment_fault, shorten_error
 from damageest.stages import JobPath
 from damageest.stages.part import CadFace, CadPmi, ReadPart
+
+if TYPE_CHECKING:
+    from damageest_cadquery._read import Model
 
 LEAST_CHORD = 1e-7
 """Least chord in diagonals of the part: OpenCASCADE's own tolerance for a part of one metre is 1e-7."""
@@ -37,6 +40,12 @@ class Brep(ReadPart):
     angle: float = Field(
         30.0, gt=0, le=180, description="largest angle between neighbouring triangles on a curved face, in degrees"
     )
+    gap: float | None = Field(
+        None,
+        gt=0,
+        description="largest gap between surfaces of a file without a solid that is closed, in the job's unit; "
+        "default: a thousandth of the part's diagonal",
+    )
     unit: UnitOption | None = Field(
         None, description="unit of the file's lengths; default: the file's own, for BREP the job's `units`"
     )
@@ -44,11 +53,10 @@ class Brep(ReadPart):
     def run(self, unit: str, tolerance: float | None) -> Part:
         """The part in ``unit``. Raises InputError for a file that OpenCASCADE cannot read or that holds no solid."""
         suffix = check_file(self.path, self.reads, "a part")
-        from damageest_cadquery._read import read
         from damageest_cadquery._tessellate import measure_diagonal, tessellate
 
         with _name_faults(self.path, suffix):
-            model = read(self.path, suffix)
+            model = self._read(suffix, unit)
             source = self.unit or model.unit or unit
             # the factor from OpenCASCADE's lengths to the job's unit
             scale = unit_factor(source, unit) / model.length
@@ -64,6 +72,7 @@ class Brep(ReadPart):
             chord = min(chord, diagonal)
             mesh = tessellate(model.solids, chord / scale, self.angle, model.name_of)
         notes = list(model.notes)
+        error = max(mesh.error, model.closed) * scale
         if canonical_unit(source) != canonical_unit(unit):
             notes.append(f"converted from {canonical_unit(source)} to {canonical_unit(unit)}")
         if mesh.error * scale > 1.5 * chord:
@@ -81,7 +90,7 @@ class Brep(ReadPart):
             faces_brep=mesh.faces_brep,
             face_names=mesh.names,
             face_kinds=mesh.kinds,
-            tessellation_error=mesh.error * scale,
+            tessellation_error=error,
             notes=tuple(notes),
             cad_scale=scale,
         )
@@ -90,12 +99,18 @@ class Brep(ReadPart):
         """The faces of the CAD model, in the order in which `run` numbers them."""
         suffix = check_file(self.path, self.reads, "a part")
         from damageest_cadquery._faces import list_faces
-        from damageest_cadquery._read import read
 
         with _name_faults(self.path, suffix):
-            model = read(self.path, suffix)
+            model = self._read(suffix, unit)
             source = self.unit or model.unit or unit
             return list_faces(model, unit_factor(source, unit) / model.length)
+
+    def _read(self, suffix: str, unit: str) -> Model:
+        """The CAD model; ``unit``: the job's."""
+        from damageest_cadquery._read import read
+
+        file_unit = (self.unit or unit) if suffix == ".brep" else "mm"
+        return read(self.path, suffix, None if self.gap is None else self.gap * unit_factor(unit, file_unit))
 
     def cad_pmi(self, unit: str) -> CadPmi:
         """Datums and tolerances of a STEP file."""

@@ -15,13 +15,15 @@ from damageest.artefacts import Deposit, DisplacementField, Floats, Mesh, Solid
 from damageest.errors import InputError
 from damageest.geometry.units import MILLIMETRES
 from damageest.io.files import shorten_error
-from damageest.isolation import Limits, ProcessError, call_isolated, find_place
+from damageest.isolation import Limits, ProcessError, Usage, call_isolated, find_place, tell_part
 from damageest.result import Result
 from damageest.stages.export import Body, ExportedFiles
 from damageest_cadquery._exact import SiteInput, scale_shape
+from damageest_cadquery._kept import find_made
 from damageest_cadquery._read import read
 from damageest_cadquery._request import (
     ADAPTING,
+    SPENT,
     WHOLE,
     Made,
     Request,
@@ -38,6 +40,10 @@ NO_FIELD = "the part was adapted to the scan by a stage that gives no field, so 
 OF_SITE = ("damage", "deposit", "milled")
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""
+BUDGET = 120.0
+"""Processor seconds for all exact work of a run, where no job says so."""
+SOLVING = 0.75
+"""Share of these until which a further site is begun; the rest is for the files."""
 WORKER = "damageest_cadquery exact"
 SIZES, USUAL = (0.5, 5_000.0), 100.0
 """Diagonals in millimetres that a part has as a rule, and to which others are brought."""
@@ -53,20 +59,37 @@ def write_exact(
     bodies: Mapping[str, Body],
     places: Mapping[str, Floats | None],
     seconds: float,
+    budget: float = BUDGET,
     assembly: bool = True,
 ) -> ExportedFiles:
     """Writes damage volumes, what is left of the part, and an assembly of all; see `damageest.stages.export.Writer`."""
     request = replace(make_request(result, folder, bodies, places, seconds), assembly=assembly)
     if not request.sites:
         return ExportedFiles()
-    made = Made((), (), {})
+    with tempfile.TemporaryDirectory(prefix="damageest-exact-") as keep:
+        return _write_within(replace(request, keep=keep), budget)
+
+
+def _write_within(request: Request, budget: float) -> ExportedFiles:
+    """Starts the process until it has done its work, each time with what it has found before, within ``budget``
+    processor seconds."""
+    made, spent = Made((), (), {}), 0.0
     for _ in range(MOST_STARTS):
-        done = _run(request, make_exact)
+        request = replace(request, left=budget - spent, solving=SOLVING * budget - spent)
+        done, used = _run(request, make_exact)
+        spent += used
         if isinstance(done, Made):
             made = done
             break
+        made = find_made(request.keep)
         what, reason = done
         if what in request.skipped:
+            break
+        if spent >= budget:
+            why = f"{SPENT}: {budget:g} s"
+            request = replace(request, skipped={**request.skipped, WHOLE: why})
+            made = replace(made, notes=(*made.notes, f"not all STEP solids have the CAD's faces: {why}"))
+            done = made
             break
         names = [what] if what not in (WHOLE, ADAPTING) else [what, *(name_site(each.number) for each in request.sites)]
         whose = what.partition(" for ")[2]
@@ -78,7 +101,8 @@ def write_exact(
             break
     forms = dict(made.forms)
     for site in request.sites:
-        why = request.skipped.get(name_site(site.number), "the process for exact solids stopped")
+        stopped = request.skipped.get(WHOLE, "the process for exact solids stopped")
+        why = request.skipped.get(name_site(site.number), stopped)
         forms.setdefault(site.number, describe_none(site, why))
     notes = tuple(
         f"site-{number}.step has facets, not the faces of the CAD file: {form.tried[-1] if form.tried else 'unknown'}"
@@ -177,25 +201,39 @@ def _scale_field(result: Result, factor: float) -> DisplacementField | None:
     return DisplacementField(field.low * factor, field.high * factor, field.controls * factor)
 
 
+def _limit(request: Request) -> Limits:
+    """Of the process as a whole: its own looks at the clock come before that, unless OpenCASCADE does not return."""
+    return Limits(seconds=request.left if math.isfinite(request.left) else 0)
+
+
 def _scale_shift(T: Floats, factor: float) -> Floats:
     moved = np.array(T)
     moved[:3, 3] *= factor
     return moved
 
 
-def _run(request: Request, work: Callable[..., Given], **more: str) -> Given | tuple[str, str]:
-    """Starts the process once. Gives what it made; or what it was doing where it stopped, and why."""
+def _run(request: Request, work: Callable[..., Given], **more: str) -> tuple[Given | tuple[str, str], float]:
+    """Starts the process once. Gives what it made, or what it was doing where it stopped and why; and the processor
+    seconds that it took."""
+    used: list[float] = []
+    done = _start(request, work, lambda usage: used.append(usage.seconds), **more)
+    return done, sum(used)
+
+
+def _start(
+    request: Request, work: Callable[..., Given], tell: Callable[[Usage], None], **more: str
+) -> Given | tuple[str, str]:
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
         arguments = {"request": replace(request, scratch=place), **more}
         try:
             return call_isolated(
-                work, arguments, worker=WORKER, owner=OWNER, limits=Limits(seconds=0), show=False, stays=False,
-                processor_time=True,
+                work, arguments, worker=WORKER, owner=OWNER, limits=_limit(request), show=False, stays=False,
+                processor_time=True, tell=tell, watch=lambda what: tell_part(f"exact STEP: {what}"),
             )  # fmt: skip
         except ProcessError as error:
             what = find_place(error) or WHOLE
             allowed = limit_form(request.seconds) if " for " in what else request.seconds
-            late = f"OpenCASCADE took longer than {allowed:g} s"
+            late = f"OpenCASCADE took longer than {min(allowed, request.left):g} s"
             return what, late if error.why == "time" else f"OpenCASCADE stopped ({error.message})"
         except Exception as error:  # OpenCASCADE's exceptions share no base of their own
             return find_place(error) or WHOLE, f"OpenCASCADE stopped ({type(error).__name__}: {shorten_error(error)})"
@@ -237,7 +275,7 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
         if result.undamaged is not None and result.damage is not None:
             bodies["undamaged"] = Body("undamaged", result.undamaged, (0, 0, 0))
             bodies["damage"] = Body("damage", result.damage, (0, 0, 0))
-        done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT, assembly=False)
+        done = write_exact(Path(place), chosen, bodies, {"": None}, LIMIT, LIMIT, assembly=False)
         folders = {"damage": ("damage/", "doubtful/"), "undamaged": ("undamaged.step",)}
         folders |= {name: (f"{name}/",) for name in ("deposit", "milled")}
         wanted = [name for name in done.files if name.startswith(folders[what])]
@@ -250,7 +288,7 @@ def _take_adapted(result: Result) -> Any:
     """The adapted part. Raises InputError where the faces of its CAD file cannot follow it."""
     with tempfile.TemporaryDirectory(prefix="damageest-exact-") as place:
         file = Path(place) / "part.brep"
-        done = _run(make_request(result, Path(place), {}, {}, LIMIT), write_part, file=str(file))
+        done, _ = _run(make_request(result, Path(place), {}, {}, LIMIT), write_part, file=str(file))
         why = done if isinstance(done, str) else done[1]
         if why:
             raise InputError(f"the adapted part has no exact form: {why}; take as_trimesh")

@@ -25,7 +25,7 @@ from damageest.stages.export import ExportedFiles
 from damageest.stages.export.files import Files
 from tests.needs import import_for, needs_plugin
 
-pytestmark = needs_plugin("cadquery")
+pytestmark = [needs_plugin("cadquery"), pytest.mark.slow]
 cq = import_for("cadquery", "cadquery")
 
 TOLERANCE = 0.2
@@ -128,7 +128,6 @@ def test_files_in_the_scan_frame_lie_where_the_scan_is(done: Run) -> None:
     assert np.median(distance_to_mesh(there[intact], Mesh(left.vertices, left.faces))) < TOLERANCE / 4
 
 
-@pytest.mark.slow
 def test_without_a_field_sites_have_facets_and_the_part_is_refused(done: Run, tmp_path: Path) -> None:
     assert done.result.adapted is not None
     blind = replace(done.result, adapted=replace(done.result.adapted, field=None))
@@ -140,7 +139,6 @@ def test_without_a_field_sites_have_facets_and_the_part_is_refused(done: Run, tm
             blind.as_cadquery(what, site)
 
 
-@pytest.mark.slow
 def test_a_field_that_is_not_that_of_the_mesh_is_refused(done: Run, tmp_path: Path) -> None:
     adapted = done.result.adapted
     assert adapted is not None
@@ -153,7 +151,6 @@ def test_a_field_that_is_not_that_of_the_mesh_is_refused(done: Run, tmp_path: Pa
     assert "damage/site-1.step" in written.files
 
 
-@pytest.mark.slow
 def test_faces_that_take_too_long_to_move_cost_the_exact_form(
     done: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

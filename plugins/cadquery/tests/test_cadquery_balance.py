@@ -119,6 +119,7 @@ def test_a_cut_is_moved_to_the_volume_of_the_mesh(monkeypatch: pytest.MonkeyPatc
     assert sum(measure_volume(piece.shape) for piece in found.pieces) == pytest.approx(lost.volume, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_of_forms_that_pass_the_one_with_the_nearest_volume_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a curved part the check of the volume has room for chords; where these are small, it is too much."""
     from damageest_cadquery import _exact

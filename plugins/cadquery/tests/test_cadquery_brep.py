@@ -54,6 +54,7 @@ def test_the_hook_gives_the_stage() -> None:
     assert ".step" in Brep.reads
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize(
     ("name", "unit"),
     [
@@ -156,6 +157,7 @@ def test_a_file_cut_short_is_refused(shape: Any, tmp_path: Path) -> None:
         Brep(path=path).run(unit="mm", tolerance=0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "extents"),
     [

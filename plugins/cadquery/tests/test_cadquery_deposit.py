@@ -168,6 +168,7 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Run:
     return Run(result, place / "out", said)
 
 
+@pytest.mark.slow
 def test_deposits_are_written_with_offset_faces(done: Run) -> None:
     for site, said in zip(done.result.sites, done.said, strict=True):
         exact = said["exact"]["deposit"]
@@ -186,6 +187,7 @@ def test_deposits_are_written_with_offset_faces(done: Run) -> None:
     assert "PRODUCT('deposit site-1'" in text
 
 
+@pytest.mark.slow
 def test_faces_of_deposits_have_names(done: Run) -> None:
     listed = list_faces(read(done.folder / "deposit/site-1.step", ".step"), 1.0)
     names = [face.name for face in listed]
@@ -210,6 +212,7 @@ def take_damage() -> tuple[Any, Any]:
     return start_solids([cq.Workplane().box(30, 20, 12).val().wrapped])
 
 
+@pytest.mark.slow
 def test_what_cannot_be_an_offset_is_said(done: Run) -> None:
     pieces, faces = take_damage()
     with pytest.raises(StockError, match="not the same all over") as caught:
@@ -223,6 +226,7 @@ def test_what_cannot_be_an_offset_is_said(done: Run) -> None:
         find_deposit(replace(deposit, heights=()), deposit, pieces, (), faces, done.result.part, 0.2)
 
 
+@pytest.mark.slow
 def test_stock_of_another_volume_is_refused(done: Run) -> None:
     """Stock on the whole top, where the mesh has it over a pit."""
     pieces, faces = take_damage()
@@ -241,6 +245,7 @@ def take_pit(radius: float, top: int, place: tuple[float, float] = (2, 3)) -> Pi
     return Piece(solid, 0, tuple((top, -1) if each else (-1, 0) for each in flat))
 
 
+@pytest.mark.slow
 def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None:
     """The exact pit is wider by two tolerances, as where the mesh does not show how a loss fades out."""
     from damageest_cadquery._compare_stock import compare_stock
@@ -265,6 +270,7 @@ def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None
         compare(high + 0.05, replace(deposit, stock_volume=0.98 * deposit.stock_volume))
 
 
+@pytest.mark.slow
 def test_a_small_body_of_the_damage_may_carry_stock(done: Run) -> None:
     """As its own piece, though it is more than a thousandth of the deposit; a larger one is refused."""
     site, part = done.result.sites[0], done.result.part
@@ -287,6 +293,7 @@ def test_a_small_body_of_the_damage_may_carry_stock(done: Run) -> None:
         find(0.45)
 
 
+@pytest.mark.slow
 def test_where_only_the_height_of_the_mesh_folds_the_mesh_is_lowered(
     done: Run, monkeypatch: pytest.MonkeyPatch
 ) -> None:

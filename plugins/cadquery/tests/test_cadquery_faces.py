@@ -33,6 +33,7 @@ def step(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("unit", [pytest.param("mm", marks=pytest.mark.slow), "in"])
 def test_each_face_is_that_of_its_triangles(step: Path, unit: str) -> None:
     stage = Brep(path=step, chord=0.004 / (25.4 if unit == "in" else 1), angle=8)

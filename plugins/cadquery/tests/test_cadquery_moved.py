@@ -64,6 +64,7 @@ DEAR = ("block with a bore and fillets", "sphere", "cone with its tip", "torus",
 """Each takes 1 s and more where it is roughened."""
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(
     ("name", "move"),
     [
@@ -101,6 +102,7 @@ def test_faces_stay_in_their_order() -> None:
     assert np.allclose(areas[0], areas[1], rtol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_field_that_is_too_fine_for_the_faces_is_refused() -> None:
     def shake(places: Floats) -> Floats:
         return np.asarray(places + 0.3 * np.sin(9 * places[:, [1, 2, 0]]))

@@ -24,7 +24,7 @@ from damageest.result import Result
 from damageest.stages.export.files import Files
 from tests.needs import import_for, needs_plugin
 
-pytestmark = needs_plugin("cadquery")
+pytestmark = [needs_plugin("cadquery"), pytest.mark.slow]
 cq = import_for("cadquery", "cadquery")
 
 BALL: dict[str, Any] = {"tool": "sphere", "centre": [2, 3, 4], "radius": 4}
@@ -129,14 +129,12 @@ def test_faces_are_named_by_what_leaves_them(opened: Run) -> None:
     assert f"PRODUCT('to be milled site-{number}'" in (folder / "result.step").read_text()
 
 
-@pytest.mark.slow
 def test_as_cadquery_gives_the_metal_to_mill_off(opened: Run) -> None:
     number = find_ball(opened)
     shape, said = opened.result.as_cadquery("milled", number), opened.said[number - 1]["exact"]["milled"]
     assert measure_volume(shape.wrapped) == pytest.approx(said["volume"], rel=1e-4)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("fault", "form", "deposit"),
     [
@@ -189,7 +187,6 @@ def cut_ball(box: Any, radius: float) -> Any:
     return Exact((Piece(solid, 0, origins),), (), "shapes", Measured(measure_volume(solid)), 0.0)
 
 
-@pytest.mark.slow
 def test_a_cavity_that_is_cut_back_is_exact_too(tmp_path: Path) -> None:
     done = run(tmp_path, inner=0.4)
     for site, said in zip(done.result.sites, done.said, strict=True):

@@ -47,6 +47,7 @@ def patch_of(surface: Surface, tolerance: float) -> Patch:
     return patch
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("hole", "unit"),
     [(1.5, "mm"), *(pytest.param(*case, marks=pytest.mark.slow) for case in ((0.0, "mm"), (0.0, "in"), (1.5, "um")))],
@@ -71,6 +72,7 @@ def test_the_face_is_where_the_surface_is(hole: float, unit: str, tmp_path: Path
     np.testing.assert_allclose([corners.min(axis=0), corners.max(axis=0)], surface.bounds, atol=0.1)
 
 
+@pytest.mark.slow
 def test_noise_is_smoothed_within_the_tolerance() -> None:
     patch, said = fit_spline(bowl(noise=0.01), 0.1)
     assert patch is not None
@@ -79,6 +81,7 @@ def test_noise_is_smoothed_within_the_tolerance() -> None:
     assert patch.poles.shape[0] < 30, "a coarse one does"
 
 
+@pytest.mark.slow
 def test_the_deviation_is_the_true_one_both_ways() -> None:
     """Of a spline that was fitted to too little: the dent of 0.5 that the fit was not shown is its deviation."""
     from damageest.geometry import height_spline

@@ -104,6 +104,7 @@ def test_what_is_missing_is_said(tmp_path: Path, pmi: str, said: str) -> None:
     assert any(said in note for note in Brep(path=write_part(tmp_path, pmi)).cad_pmi("mm").notes)
 
 
+@pytest.mark.slow
 def test_part_prints_them_and_init_writes_them(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = write_part(tmp_path)
     faces = Brep(path=path).cad_faces("mm")

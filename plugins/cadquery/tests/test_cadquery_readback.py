@@ -98,6 +98,7 @@ def test_stock_that_no_way_can_write_is_left_out_and_said(tmp_path: Path) -> Non
     assert not path.exists()
 
 
+@pytest.mark.slow
 def test_only_the_solid_that_cannot_be_written_gets_facets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A writer that loses one solid as long as it has CAD faces."""
     from damageest_cadquery import _files
@@ -162,6 +163,19 @@ def test_a_file_without_what_it_is_to_hold_is_not_moved(tmp_path: Path) -> None:
     done = write_first(scratch, tmp_path / "a.step", [way("larger"), Way("right", lambda: box.wrapped, copy)])
     assert done.said.startswith("was written right: read back before, the volume")
     assert take_solids(tmp_path / "a.step")[0].Volume() == pytest.approx(6)
+
+
+def test_a_file_that_others_may_refuse_has_another_name(tmp_path: Path) -> None:
+    """All volume is in it, in one solid for two: a reader that looks for a file of the usual name finds none."""
+    from damageest_cadquery._step import Way, write_first
+
+    two = cq.Workplane().box(2, 2, 2).union(cq.Workplane().box(2, 2, 2).translate((2, 0, 0)), clean=True).val()
+    halves = cq.Compound.makeCompound([cq.Workplane().box(2, 2, 2).translate((k, 0, 0)).val() for k in (0, 2)])
+    way = Way("as it is", lambda: two.wrapped, copy, lambda _: halves.wrapped)
+    done = write_first(tmp_path / "scratch.step", tmp_path / "a.step", [way])
+    assert not done.is_valid
+    assert "is called a-invalid.step, since other programs may refuse it: read back, it holds 1 solids" in done.said
+    assert [path.name for path in tmp_path.iterdir()] == ["a-invalid.step"]
 
 
 def copy(path: Path, shape: Any) -> None:

@@ -43,9 +43,10 @@ CASES = {
     # a fillet touches a bore along a circle: between them is a gap that closes to nothing
     "Axis_of_bearing.brep": Case((-42.545, -78.741, 0.0), 142.345, narrow=True),
 }
-QUICK = ("CrankArm.brep",)
+QUICK: tuple[str, ...] = ()
 
 
+@pytest.mark.variants(slow=2)
 @pytest.mark.parametrize(
     "name", [pytest.param(name, marks=() if name in QUICK else pytest.mark.slow) for name in CASES]
 )

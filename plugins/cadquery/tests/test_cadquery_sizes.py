@@ -25,6 +25,7 @@ def test_a_part_is_enlarged_by_a_power_of_two_where_its_size_is_unusual() -> Non
         assert float(factor).hex().startswith("0x1.0000000000000p")
 
 
+@pytest.mark.slow
 def test_a_part_of_micrometres_has_exact_damage_volumes(tmp_path: Path) -> None:
     """A block of 30 x 20 x 12 times 1e-4, with a bore, in a BREP file, which has no unit."""
     from OCP.BRepTools import BRepTools

@@ -44,6 +44,7 @@ def written(made: Solid, folder: Path, unit: str = "mm") -> Any:
     return cq.importers.importStep(str(folder / "a.step"))
 
 
+@pytest.mark.variants(slow=4)
 @pytest.mark.parametrize(
     "unit", [pytest.param(unit, marks=pytest.mark.slow) for unit in ("in", "um", "mm", "cm", "m", "ft")]
 )

@@ -59,6 +59,7 @@ def test_stock_ends_at_the_axis_where_its_neighbours_go_on() -> None:
     assert measure(build_stock(bases)) == pytest.approx(SECTION * 10, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_at_a_straight_end_the_stock_goes_on_over_the_edges() -> None:
     lost = make_angle().intersect(cq.Workplane().box(20, 10, 20).translate((10, -2, 10)))  # 7 of it in the part
     bases = list_outer(lost, ((0, 1, 0),))
@@ -68,6 +69,7 @@ def test_at_a_straight_end_the_stock_goes_on_over_the_edges() -> None:
     assert measure(build_stock(bases)) == pytest.approx(expected, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_sides_that_touch_at_the_axis_are_refused() -> None:
     """The end of the loss on the fillet goes along the axis and back."""
     bite = cq.Workplane().sphere(3).translate((11, -15, 11))
@@ -77,6 +79,7 @@ def test_sides_that_touch_at_the_axis_are_refused() -> None:
         build_wedge(face)
 
 
+@pytest.mark.slow
 def test_an_end_at_a_slant_is_refused() -> None:
     cutter = cq.Workplane().box(100, 60, 200).rotate((0, 0, 0), (1, 0, 0), 30).translate((10, 31, 10))
     lost = make_angle().cut(cutter).intersect(cq.Workplane().box(20, 30, 20).translate((10, -10, 10)))
@@ -86,6 +89,7 @@ def test_an_end_at_a_slant_is_refused() -> None:
         build_stock(bases)
 
 
+@pytest.mark.slow
 @settings(max_examples=6, deadline=None, derandomize=True)
 @given(
     place=st.tuples(*[st.floats(-2, 2)] * 3), size=st.floats(5, 9), turn=st.floats(0, 90), ball=st.booleans()

@@ -20,12 +20,12 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Scan, Solid
 from damageest.errors import DamageestError
+from damageest.geometry.lost_depth import measure_lost_depth
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.io.digests import digest
 from damageest.result import Result
 from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import describe_measurement, format_markdown
-from damageest_evaluate.scores import measure_depth
 
 POINTS, NOISE, TOLERANCE = 4000, 0.04, 0.2
 """Points of a scan, their noise and the tolerance in mm."""
@@ -210,7 +210,7 @@ def make_scene(name: str, rng: np.random.Generator | None = None) -> Scene:
     metal, damage = to_solid(to_manifold(part) - tool), to_solid(to_manifold(part) ^ tool)
     assert metal is not None
     assert damage is not None
-    return Scene(part, metal, damage.volume, measure_depth(damage, part))
+    return Scene(part, metal, damage.volume, measure_lost_depth(damage, part))
 
 
 def _sample(mesh: Solid, rng: np.random.Generator) -> tuple[Floats, Floats]:

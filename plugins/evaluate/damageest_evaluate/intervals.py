@@ -12,6 +12,7 @@ import numpy as np
 from damageest.artefacts import Scan
 from damageest.errors import DamageestError, InputError, suggest
 from damageest.findings import Interval
+from damageest.geometry.lost_depth import measure_lost_depth
 from damageest.io.digests import digest
 from damageest.registry import Registry
 from damageest.result import Result
@@ -21,7 +22,6 @@ from damageest_evaluate.job import fingerprint_code
 from damageest_evaluate.parts import PARTS
 from damageest_evaluate.processes import Row
 from damageest_evaluate.readme import describe_measurement, format_markdown
-from damageest_evaluate.scores import measure_depth
 
 NOISES = (0.00025, 0.0005, 0.001)
 """Noise of the scan, as shares of the part's diagonal. The tolerance is four times the noise."""
@@ -89,7 +89,7 @@ def run_interval_case(case: IntervalCase) -> Row:
         return row | {"error": " ".join(str(error).split()), "skipped": True}
     truth = scan.truth.damage if scan.truth else None
     assert truth is not None
-    row |= {"kinds": list(kinds), "true_volume": truth.volume, "true_depth": measure_depth(truth, part)}
+    row |= {"kinds": list(kinds), "true_volume": truth.volume, "true_depth": measure_lost_depth(truth, part)}
     start = time.perf_counter()
     try:
         job = {"version": 1, "tolerance": case.tolerance}

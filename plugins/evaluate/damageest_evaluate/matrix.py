@@ -1,7 +1,7 @@
 """Accuracy, time and memory of every implementation of every stage, with all other stages at their defaults.
 
-The scans of the jobs are simulated, so that the truth is known. Each run has a process of its own, so that its peak
-memory can be measured.
+The scans of the jobs are simulated, so that the truth is known; else a job's own result stands for it. Each run has a
+process of its own, so that its peak memory can be measured.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Part, Scan, Solid, Truth
+from damageest.artefacts import Part, Scan, Solid
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import STAGES
@@ -31,7 +31,8 @@ class MatrixCell:
     """One implementation on one job.
 
     ``refused``: the reason if there is no result (``iou`` is NaN), or none for some sites. ``flagged``: the result's
-    own checks failed. ``stage_seconds``: time in the stage; ``seconds``: time of the run; ``megabytes``: peak memory.
+    own checks failed. ``volume``: found for true. ``stage_seconds``: time in the stage; ``seconds``: time of the run;
+    ``megabytes``: peak memory.
     """
 
     stage: str
@@ -40,6 +41,7 @@ class MatrixCell:
     iou: float
     flagged: bool = False
     refused: str = ""
+    volume: float = float("nan")
     stage_seconds: float = float("nan")
     seconds: float = float("nan")
     megabytes: float = float("nan")
@@ -53,7 +55,7 @@ def run_matrix(
     timeout: float = 300,
     tell: Callable[[MatrixCell], None] = lambda cell: None,
 ) -> list[MatrixCell]:
-    """All cells, ordered by stage, implementation and job. Raises JobError for an invalid job or an unknown truth."""
+    """All cells, ordered by stage, implementation and job. Raises JobError for an invalid job or an unknown stage."""
     if unknown := [stage for stage in stages if stage not in STAGES]:
         raise JobError([Fault(f"no stage '{unknown[0]}'; there are: {', '.join(STAGES)}")], "matrix")
     with tempfile.TemporaryDirectory(prefix="damageest-matrix-") as folder:
@@ -92,11 +94,10 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     folder = Path(case["folder"])
     data = np.load(folder / "scene.npz")
     part = Part(data["vertices"], data["faces"], unit=str(data["unit"]))
-    truth = Truth(Solid(data["lost"], data["lost_faces"]), data["pose"])
+    lost, pose = Solid(data["lost"], data["lost_faces"]), data["pose"]
     start = time.perf_counter()
     row: dict[str, Any] = {"iou": float("nan")}
     given: dict[str, Any] = {} if case["own_part"] else {"part": part}
-    pose = truth.T_part_scan
     if not case["own_scan"]:
         move = np.array(case["moved"])
         given["scan"] = Scan(data["points"], unit=str(data["unit"])).move(move)
@@ -111,7 +112,8 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     row["stage_seconds"] = sum(record.seconds for record in result.stages if record.stage == case["stage"])
     row["megabytes"] = memory.take_peak()
     solids = [site.damage for site in result.sites]
-    row["iou"] = score(part, solids, truth.damage, result.tolerance, result.pose.T_part_scan, pose).iou
+    row["iou"] = score(part, solids, lost, result.tolerance, result.pose.T_part_scan, pose).iou
+    row["volume"] = result.damage_volume / lost.volume
     row["flagged"] = result.status != "ok" or not all(site.evidence.consistent for site in result.sites)
     if result.failures:
         row["refused"] = _shorten_reason(result.failures[0])

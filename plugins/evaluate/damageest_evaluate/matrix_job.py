@@ -9,18 +9,22 @@ from typing import Any
 
 import numpy as np
 
-from damageest import read_inputs
-from damageest.artefacts import Floats, Part
+from damageest import read_inputs, run
+from damageest.artefacts import Floats, Part, Scan, Solid
 from damageest.errors import Fault, JobError
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.io.meshes import write_points, write_stl
 from damageest.job import load
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import SURFACE_ONLY
+from damageest.stages.adapt import Adapt
+from damageest.stages.align import Align
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 
+KEPT = (Align, Adapt)
+"""Contracts whose implementation stays that of the job: without it, its scan would not fit its part."""
 OFF_DEGREES, OFF_SHARE = 3.0, 0.01
 """Rotation, and shift as a share of the part's diagonal, of the scan for an `align` that needs a start pose."""
 
@@ -29,7 +33,8 @@ OFF_DEGREES, OFF_SHARE = 3.0, 0.01
 class MatrixJob:
     """A job and its files in ``folder``: scene.npz, part.stl, scan.ply, specimen.ply (a scan of the intact part).
 
-    ``values``: the job as a mapping. ``bounds`` (2,3): of the part. ``pose`` (4,4): the true ``T_part_scan``.
+    ``name`` ends with a star where its own result stands for the true damage. ``values``: the job as a mapping.
+    ``bounds`` (2,3): of the part. ``pose`` (4,4): the true ``T_part_scan``.
     """
 
     name: str
@@ -41,15 +46,17 @@ class MatrixJob:
 
 
 def prepare_matrix_job(path: Path, registry: Registry, folder: Path) -> MatrixJob:
-    """Reads a job and writes its files. Raises JobError if the job is invalid or its scan is not simulated."""
+    """Reads a job and writes its files.
+
+    Where the true damage is not known, that of a run with the job's own stages stands for it. Raises JobError if the
+    job is invalid, and any error of that run.
+    """
     job = load(path, registry)
     part, scan = read_inputs(job, registry)
-    if scan.truth is None or scan.truth.damage is None:
-        raise JobError(
-            [Fault("the true damage is not known; use a job with  scan: {use: simulate, damage: [...]}")], str(path)
-        )
+    truth = scan.truth
+    known = truth is not None and truth.damage is not None
+    damage, pose = (truth.damage, truth.T_part_scan) if truth and truth.damage else _run_default(path, registry)
     folder.mkdir(parents=True)
-    damage = scan.truth.damage
     np.savez(
         folder / "scene.npz",
         vertices=part.vertices,
@@ -58,18 +65,36 @@ def prepare_matrix_job(path: Path, registry: Registry, folder: Path) -> MatrixJo
         points=scan.points,
         lost=damage.vertices,
         lost_faces=damage.faces,
-        pose=scan.truth.T_part_scan,
+        pose=pose,
     )
     write_stl(folder / "part.stl", part)
+    _write_scans(part, scan, folder)
+    kept = {one.stage: job.stages[one].model_dump(mode="json") for one in KEPT}
+    values = {"version": 1, "units": job.units, "tolerance": job.tolerance or "auto", **kept}
+    values["scan"] = job.stages[ReadScan].model_dump(mode="json")
+    return MatrixJob(
+        job.name if known else f"{job.name}*",
+        folder,
+        values,
+        str(getattr(job.stages[ReadPart], "path", "")),
+        part.bounds,
+        pose,
+    )
+
+
+def _run_default(path: Path, registry: Registry) -> tuple[Solid, Floats]:
+    """The damage and the pose that the job finds with its own stages."""
+    result = run(path, settings=["path=none", "report=none"], registry=registry, output=False)
+    if not isinstance(result.damage, Solid):
+        raise JobError([Fault("neither is the true damage known, nor does the job find any")], str(path))
+    return result.damage, result.pose.T_part_scan
+
+
+def _write_scans(part: Part, scan: Scan, folder: Path) -> None:
     noise = measure_noise_and_spacing(scan.points)[0]
     for name, points in (("scan", scan.points), ("specimen", _scan_specimen(part, len(scan.points), noise))):
         x, y, z = points.T
         write_points(folder / f"{name}.ply", {"x": x, "y": y, "z": z})
-    values = {"version": 1, "units": job.units, "tolerance": job.tolerance or "auto"}
-    values["scan"] = job.stages[ReadScan].model_dump(mode="json")
-    return MatrixJob(
-        job.name, folder, values, str(getattr(job.stages[ReadPart], "path", "")), part.bounds, scan.truth.T_part_scan
-    )
 
 
 def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | str:

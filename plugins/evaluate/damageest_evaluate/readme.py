@@ -24,8 +24,11 @@ def make_marks(kind: str) -> tuple[str, str]:
     return f"<!-- {kind}: begin -->", f"<!-- {kind}: end -->"
 
 
+OFF = 0.03
+"""Relative error of a volume from which the matrix shows it."""
 MATRIX = (
-    "Columns with a job's name: intersection over union of found and true damage; flagged: a check of the result "
+    "Columns with a job's name: intersection over union of found and true damage, with a star of found damage and that "
+    "of the job's own stages; volume: found for true, where it is off by more than 3 %; flagged: a check of the result "
     "failed. stage, s and run, s: median seconds of the stage and of the whole run. peak, MB: the largest peak memory "
     "of a run"
 )
@@ -70,7 +73,8 @@ def _format_cell(cell: MatrixCell, reasons: list[str]) -> str:
     why = f"refused [{reasons.index(cell.refused) + 1}]" if cell.refused else ""
     if math.isnan(cell.iou):
         return why or "–"
-    return f"{cell.iou:.3f}" + (f", partly {why}" if why else " (flagged)" if cell.flagged else "")
+    off = f" (volume {cell.volume:.2f})" if abs(cell.volume - 1) > OFF else ""
+    return f"{cell.iou:.3f}{off}" + (f", partly {why}" if why else " (flagged)" if cell.flagged else "")
 
 
 def _format_number(values: Sequence[float], form: str, of: object = np.median) -> str:

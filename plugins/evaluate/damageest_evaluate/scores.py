@@ -85,7 +85,7 @@ def measure_pose_error(part: Mesh, found: Floats, true: Floats) -> tuple[float, 
 
 
 def measure_depth(damage: Mesh, part: Mesh) -> float:
-    """The largest depth of the damage below the part's surface."""
+    """The largest distance of the damage from the part's surface."""
     points = np.concatenate([damage.vertices, sample_surface(damage, 2000)[0]])
     return float(distance_to_mesh(points, part).max())
 

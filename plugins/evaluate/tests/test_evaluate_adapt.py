@@ -24,6 +24,7 @@ from damageest.stages.scan.deformation import Deformation, deform
 from tests import damaged_box
 
 
+@pytest.mark.slow
 def test_the_suite_has_enough_of_everything() -> None:
     cases = [case for case in make_adapting_cases([], "", 1000, "") if case.use == "auto"]
     count = Counter(case.group for case in cases)
@@ -37,6 +38,7 @@ def test_the_suite_has_enough_of_everything() -> None:
     assert len(set(keys)) == len(keys)
 
 
+@pytest.mark.slow
 def test_the_plain_fit_follows_a_bend() -> None:
     part = damaged_box.box()
     points = deform(sample_by_area(part, 4000, np.random.default_rng(1))[0], Deformation(bend=1.0), part)
@@ -44,6 +46,7 @@ def test_the_plain_fit_follows_a_bend() -> None:
     assert np.abs(signed_distance(points, fit_plainly(part, points))[0]).max() < 0.05
 
 
+@pytest.mark.slow
 def test_the_table_counts_what_is_right() -> None:
     case = make_adapting_cases(["whole"], "", 1000, "")[0]
     row = case.make_blank_row()

@@ -42,6 +42,7 @@ def test_the_truth_of_a_scene_is_that_of_its_tool() -> None:
     assert scene.depth == pytest.approx(2.5, abs=0.02)
 
 
+@pytest.mark.slow
 def test_a_draw_has_errors_of_all_kinds_and_an_interval() -> None:
     scene = make_scene("plate")
     row = scene.run(np.random.default_rng(0), Registry.discover())

@@ -9,6 +9,7 @@ from damageest.geometry.solids import to_manifold
 from damageest.stages.scan.simulate import Simulate
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("kind", sorted(KINDS))
 @pytest.mark.parametrize("name", ["tube", "lever"])
 def test_each_kind_makes_a_loss_of_its_size(kind: str, name: str) -> None:
@@ -20,6 +21,7 @@ def test_each_kind_makes_a_loss_of_its_size(kind: str, name: str) -> None:
     assert (to_manifold(made.damage) - to_manifold(part)).volume() < 1e-9 * part.volume
 
 
+@pytest.mark.slow
 def test_a_damage_repeats_and_is_what_the_virtual_scanner_takes_off() -> None:
     part = PARTS["coupling"]()
     a, b, other = make_random_damage(part, 7), make_random_damage(part, 7), make_random_damage(part, 8)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import pytest
 from damageest_evaluate.forms import FormCase, make_form_cases, run_case
 
 
@@ -11,6 +12,7 @@ def test_every_kind_is_there_on_at_least_six_parts() -> None:
     assert len({case.part for case in cases}) >= 6
 
 
+@pytest.mark.slow
 def test_a_row_says_what_was_found() -> None:
     cells = [cell.strip() for cell in run_case(FormCase("plate", "twist", 2.0), False).split("|")]
     assert cells[3] == "deformed"

@@ -40,7 +40,7 @@ def test_depths_found_and_not_found_are_told_kept_and_gone_on_from(tmp_path: Pat
         assert (row["found"], row["missed"], row["false_sites"]) == (int(row["size"] > 0), 0, 0)
         if row["size"]:
             assert row["iou"] > 0.9
-            assert row["distance_median"] < row["distance_95"] < row["distance_max"] < 2
+            assert row["distance_median"] < row["distance_95"] < row["distance_max"] < 2.1
             assert row["depth"] == pytest.approx(4, rel=0.05)
             assert {"segment", "enclose"} < set(row["stage_seconds"])
     head, *body = [text.split() for text in done.stdout.splitlines() if text.startswith(("depth", "0", "4"))][:3]
@@ -90,6 +90,7 @@ def test_cases_that_fail_or_do_not_fit_stop_nothing(tmp_path: Path) -> None:
     assert "skipped cases: 2; the first: no damage with a depth of 25 fits the part" in done.stdout
 
 
+@pytest.mark.slow
 def test_a_case_that_takes_too_long_is_a_row_with_an_error(tmp_path: Path) -> None:
     job = damaged_box.write(tmp_path, SIMULATED.replace("20000", "2000"), 2000)
     words = ["evaluate", "job", str(job), "--seeds", "1", "--size", "4", "--timeout", "0.01"]
@@ -104,6 +105,7 @@ def real(tmp_path: Path) -> Path:
     return damaged_box.write(tmp_path)
 
 
+@pytest.mark.slow
 def test_the_virtual_scanner_is_like_the_jobs_scan(real: Path, tmp_path: Path, registry: Registry) -> None:
     found = plan_study(real, VariationRequest(), 3, registry, tmp_path)
     case = found.cases[-1]
@@ -125,6 +127,7 @@ def sparse(tmp_path: Path) -> Path:
     return damaged_box.write(tmp_path, points=2000)
 
 
+@pytest.mark.slow
 def test_the_key_does_not_depend_on_where_the_files_lie(sparse: Path, tmp_path: Path, registry: Registry) -> None:
     other = damaged_box.write(tmp_path / "moved", points=2000)
     (tmp_path / "place").mkdir()

@@ -6,11 +6,14 @@ import re
 from math import nan
 from pathlib import Path
 
+import numpy as np
 import pytest
 import trimesh
 from damageest_evaluate.matrix import MatrixCell, run_matrix
+from damageest_evaluate.matrix_job import prepare_matrix_job
 from damageest_evaluate.readme import make_marks, make_matrix_table, replace_between_marks
 
+from damageest.artefacts import Solid
 from damageest.errors import InputError, JobError
 from damageest.registry import Registry
 from damageest.registry.contracts import STAGES
@@ -64,9 +67,16 @@ def test_a_refusal_is_shown_with_its_reason() -> None:
     assert re.search(r"\| repair \| none \| refused \[1\] \|", make_matrix_table([cells[1]]))
 
 
-def test_a_job_without_a_truth_is_refused(tmp_path: Path, registry: Registry) -> None:
-    with pytest.raises(JobError, match="true damage is not known"):
-        run_matrix([damaged_box.write(tmp_path)], registry)
+def test_a_jobs_own_result_stands_for_a_truth_that_is_not_known(tmp_path: Path, registry: Registry) -> None:
+    scene = prepare_matrix_job(damaged_box.write_least(tmp_path), registry, tmp_path / "scene")
+    assert scene.name == "job*"
+    data = np.load(scene.folder / "scene.npz")
+    assert Solid(data["lost"], data["lost_faces"]).volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.1)
+
+
+def test_an_unknown_stage_is_refused(tmp_path: Path, registry: Registry) -> None:
+    with pytest.raises(JobError, match="no stage 'grind'"):
+        run_matrix([damaged_box.write(tmp_path)], registry, ["grind"])
 
 
 def test_the_table_goes_between_the_marks_and_nowhere_else(tmp_path: Path) -> None:

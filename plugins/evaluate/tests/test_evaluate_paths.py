@@ -32,11 +32,12 @@ def test_a_tooth_is_built_up_with_five_axes_and_nothing_is_touched() -> None:
     assert row.crossings == 0
     assert row.spill <= 1.1
     assert row.shaded == 0
-    assert row.sunk <= 0.05
+    assert row.sunk <= 0.06
     assert row.flips == 0
     assert "| tooth | 5 | 1 |" in make_table([row, plain])
 
 
+@pytest.mark.slow
 def test_the_check_sees_a_nozzle_in_metal() -> None:
     loss, path = plan_dent()
     assert measure_nozzle(path, loss.left, 0.2) >= 0.75 * min(path.clearance, path.travel_clearance)
@@ -44,6 +45,7 @@ def test_the_check_sees_a_nozzle_in_metal() -> None:
     assert measure_nozzle(lower, loss.left, 5.0) == pytest.approx(0, abs=1e-9)
 
 
+@pytest.mark.slow
 def test_the_check_sees_beads_and_beam_in_metal() -> None:
     loss, path = plan_dent()
     assert measure_shaded(path, loss.left, path.width / 4) == 0

@@ -72,6 +72,7 @@ class OddCase(DamageCase):
         return {**self.make_blank_row(), "kinds": (1, 2), "volume": math.nan}
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(
     ("what", "error"),
     [
@@ -86,6 +87,7 @@ def test_a_case_without_a_row_says_why(what: str, error: str) -> None:
     assert row["part"] == "cuboid"
 
 
+@pytest.mark.slow
 def test_a_row_is_as_a_file_holds_it() -> None:
     row = rows_module.run_one(OddCase("cuboid", 0, "", 0.2, scanner=CASES[0].scanner), 60)
     assert row["kinds"] == [1, 2]

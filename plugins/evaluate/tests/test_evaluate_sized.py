@@ -20,6 +20,7 @@ def test_a_loss_is_as_deep_as_asked_for(kind: str, deep: float) -> None:
     assert make_sized_damage(part, 3, deep, kind).tools != made.tools
 
 
+@pytest.mark.slow
 def test_deeper_than_the_walls_is_refused() -> None:
     with pytest.raises(LookupError, match="no damage with a depth of 40"):
         make_sized_damage(PARTS["cuboid"](), 0, 40)

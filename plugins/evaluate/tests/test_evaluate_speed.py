@@ -42,6 +42,7 @@ def test_a_wrong_value_is_refused(words: list[str], said: str) -> None:
     assert said in str(caught.value)
 
 
+@pytest.mark.slow
 def test_cases_have_the_damage_of_their_kind(registry: Registry) -> None:
     cases = make_speed_cases(list(KINDS), 0, [], registry)
     assert [len(case.tools) for case in cases] == [len(kind.tools) for kind in KINDS.values()]

@@ -15,6 +15,7 @@ from damageest.cli import app
 from damageest.errors import InputError
 
 
+@pytest.mark.slow
 def test_a_run_is_judged_and_measured() -> None:
     (case,) = make_trouble_cases(["undamaged part, full"], ["block"], points=4000)
     row = run_case(case)

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 from machine_checks import compare, load
 from machine_readers import Read
 from scipy.spatial.transform import Rotation
@@ -43,6 +44,7 @@ def read_urscript(text: str) -> Read:
     return found
 
 
+@pytest.mark.slow
 def test_the_dialect_of_the_guide_follows_the_path(tmp_path: Path) -> None:
     path = plan(corner(), simulate=False, direction=(0.6, 0.48, 0.64), axes=5)
     space: dict[str, Any] = {"__name__": "acme_urscript"}

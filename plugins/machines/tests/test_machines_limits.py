@@ -59,6 +59,7 @@ def limit(machine: str, name: str, low: float, high: float) -> dict[str, Any]:
 FIVE = ["linuxcnc_table_table", "sinumerik_table_table", "heidenhain_head_table", "sinumerik_head_head"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("machine", FIVE)
 @settings(max_examples=10, deadline=None)
 @given(st.lists(st.tuples(st.floats(-120, 120), st.floats(0, 80)), min_size=2, max_size=5))

@@ -36,6 +36,7 @@ def make_path(kind: str) -> DepositPath:
     return replace(path, channels=("power", "gas"), values=values, dwell=dwell)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("form", "machine"), [*PAIRS, *STRAIGHT])
 @pytest.mark.parametrize("kind", ["straight", "tilted"])
 def test_the_control_would_follow_the_path(form: str, machine: str, kind: str, tmp_path: Path) -> None:
@@ -97,6 +98,7 @@ def test_linuxcnc_reads_its_programs(machine: str, kind: str, tmp_path: Path) ->
     assert np.abs(inner - expected).max() < 1e-4
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not (PARSER / "krl_check.py").is_file(), reason=f"no parser of KRL in {PARSER}")
 @pytest.mark.parametrize("machine", [pytest.param("kuka", marks=pytest.mark.slow), "kuka_positioner"])
 def test_a_parser_of_krl_by_others_takes_the_program(machine: str, tmp_path: Path) -> None:

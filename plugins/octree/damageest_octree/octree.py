@@ -22,6 +22,8 @@ BYTES_PER_LEAF, BYTES_PER_CELL, BYTES_PER_POINT = 600, 80, 230
 """Largest memory use; measured: 440 to 590 for a leaf of the octree, 73 for a cell of the grid round a loss."""
 REACHES = (0, 1, 2, 3)
 """Cells by which the shell of damaged points is thickened, in the order in which they are tried."""
+GROWN, GROWTH = 3, 1.5
+"""How often the cells are made larger where the job does not say how large they are, and by how much."""
 FINEST = 1 / 3
 """Smallest cell, in point spacings: the widest closing, seven cells, then bridges about twice the spacing. Gaps between
 random points are not always smaller."""
@@ -66,7 +68,15 @@ class Octree(EncloseAll):
         if not sites.count:
             return Enclosures(())
         cube, notes = self._choose_cube(part, aligned, tolerance)
-        flags = _classify_without_leak(cube, part, aligned, deviation, sites)
+        deepest = -float(deviation.distance[sites.label > 0].min())
+        if deepest < cube.cell:
+            raise StageError(
+                f"no damage is as deep as a cell of {cube.cell:.3g}: the deepest is {deepest:.3g}",
+                f"enclose.cell: {0.5 * deepest:.2g}, where the points are nearer than that",
+                method="implicit",
+            )
+        cube, flags, more = self._classify(cube, part, aligned, deviation, sites)
+        notes += more
         if flags.reach:
             notes += (f"gaps between the scan points were closed up to {2 * flags.reach} cells of {cube.cell:.3g}",)
         if flags.unseen > NOTED_UNSEEN:
@@ -122,6 +132,24 @@ class Octree(EncloseAll):
                 f"{_suggest_options(span, max(fits, aligned.spacing))}, or a larger enclose.memory",
             )
         return _make_cube(part, fits), (f"cells of {fits:.3g} instead of {wanted:.3g}, to fit into enclose.memory",)
+
+    def _classify(
+        self, cube: Cube, part: Part, aligned: Scan, deviation: Deviation, sites: Sites
+    ) -> tuple[Cube, NodeFlags, tuple[str, ...]]:
+        """The flags of the cube's cells; where the job does not say how large these are, larger ones are tried before
+        the scan is refused."""
+        start = cube.cell
+        for more in range(GROWN if self.cell is None and self.depth is None else 0, -1, -1):
+            try:
+                flags = _classify_without_leak(cube, part, aligned, deviation, sites)
+            except StageError:
+                if not more:
+                    raise
+                cube = _make_cube(part, GROWTH * cube.cell)
+            else:
+                break
+        note = f"cells of {cube.cell:.3g} instead of {start:.3g}, which leave holes between the points of the scan"
+        return cube, flags, (note,) if cube.cell > start else ()
 
 
 def _classify_without_leak(cube: Cube, part: Part, aligned: Scan, deviation: Deviation, sites: Sites) -> NodeFlags:

@@ -42,6 +42,7 @@ def read_advice(error: StageError, option: str) -> float:
     return float(found[1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "least"),
     [("pit", 0.92), ("worn through", 0.89),
@@ -57,6 +58,7 @@ def test_the_part_inside_it_is_the_damage(name: str, least: float) -> None:
     assert (depth > CELL).sum() <= 1e-3 * len(intact)
 
 
+@pytest.mark.slow
 def test_every_site_is_in_an_enclosure_and_enclosures_are_disjoint() -> None:
     case, enclosures = scene("two"), enclose("two")
     assert sorted(k for item in enclosures.items for k in item.sites) == list(range(1, case.sites.count + 1))
@@ -69,6 +71,7 @@ def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
     assert np.abs(item.solid.bounds - truth.bounds).max() < 6 * CELL
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("points", "off"), [(10_000, 0.16), pytest.param(20_000, 0.08, marks=pytest.mark.slow)])
 def test_the_route_gives_the_lost_half_ball(points: int, off: float, tmp_path: Path) -> None:
     result = damageest.run(damaged_box.write(tmp_path, damaged_box.JOB + "method: octree\n", points))
@@ -77,12 +80,14 @@ def test_the_route_gives_the_lost_half_ball(points: int, off: float, tmp_path: P
     assert site.evidence.consistent
 
 
+@pytest.mark.slow
 def test_coarser_cells_give_a_coarser_volume() -> None:
     case = scene("end")
     fine, middle, coarse = (iou(intersect(case, enclose("end", cell=cell)), case.truth) for cell in (0.6, 1.0, 1.6))
     assert fine > middle > coarse > 0.9
 
 
+@pytest.mark.slow
 def test_depth_sets_the_cell_too() -> None:
     by_depth, by_cell = enclose("pit", depth=6), enclose("pit", cell=30 / (2**6 - 16))
     assert by_depth.items[0].solid.vertices.tobytes() == by_cell.items[0].solid.vertices.tobytes()
@@ -91,6 +96,7 @@ def test_depth_sets_the_cell_too() -> None:
         Octree(depth=6, cell=1)
 
 
+@pytest.mark.slow
 def test_cells_that_do_not_fit_into_memory_are_refused_and_those_that_fit_are_named() -> None:
     inputs = scene("pit").inputs()
     with pytest.raises(StageError, match=r"need .* GiB; enclose.memory is 0\.02") as caught:
@@ -101,6 +107,7 @@ def test_cells_that_do_not_fit_into_memory_are_refused_and_those_that_fit_are_na
     assert Octree(depth=depth, memory=0.02).run(**inputs).items
 
 
+@pytest.mark.slow
 def test_the_default_cell_grows_to_fit_into_memory_and_a_note_says_so() -> None:
     case = scene("end")
     enclosures = Octree(memory=0.02).run(**case.inputs())
@@ -117,6 +124,7 @@ def test_a_grid_round_a_loss_that_does_not_fit_into_memory_is_refused(monkeypatc
     assert Octree(cell=read_advice(caught.value, "cell")).run(**inputs).items
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "options", [{"depth": 12}, *(pytest.param({"cell": cell}, marks=pytest.mark.slow) for cell in (0.05, 0.13))]
 )
@@ -129,11 +137,12 @@ def test_cells_finer_than_the_scan_are_refused(options: dict[str, Any]) -> None:
 
 
 def test_damage_shallower_than_the_cells_is_refused() -> None:
-    with pytest.raises(StageError, match="shallower than the cells") as caught:
+    with pytest.raises(StageError, match="as deep as a cell") as caught:
         Octree(cell=3).run(**scene("pit").inputs())
     assert "method: implicit" in caught.value.remedy
 
 
+@pytest.mark.slow
 def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     case = scene("pit")
     partial = case.without(np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3)
@@ -143,6 +152,7 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     assert enclose("pit").items[0].notes == ("gaps between the scan points were closed up to 2 cells of 0.32",)
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_bytes() -> None:
     first, again = enclose("pit"), Octree().run(**scene("pit").inputs())
     for one, other in zip(first.items, again.items, strict=True):
@@ -151,6 +161,7 @@ def test_the_same_input_gives_the_same_bytes() -> None:
         assert (one.sites, one.notes) == (other.sites, other.notes)
 
 
+@pytest.mark.slow
 def test_far_from_the_origin_the_damage_is_the_same() -> None:
     case, shift = scene("pit"), np.array([3e5, -2e5, 1e5])
     moved = {

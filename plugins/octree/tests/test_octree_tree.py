@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import igl
 import numpy as np
+import pytest
 from damageest_octree.tree import build_tree, decode, dilate, encode, find_touched_cells
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -41,6 +42,7 @@ def _undirect(pairs: np.ndarray) -> set[tuple[int, int]]:
     return set(map(tuple, np.sort(pairs, axis=1).tolist()))
 
 
+@pytest.mark.slow
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=25, deadline=None)
 def test_touched_cells_are_those_that_the_triangles_meet(seed: int) -> None:

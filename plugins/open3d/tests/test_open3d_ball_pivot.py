@@ -71,6 +71,20 @@ def test_far_from_the_origin() -> None:
     assert np.sqrt((off**2).mean()) < 0.6 * NOISE
 
 
+@pytest.mark.parametrize("share", [1.0, 0.1])
+def test_a_hollow_is_as_deep_as_it_is_also_where_a_half_is_sparse(share: float) -> None:
+    """Chords would make it shallower, where the points are sparse by many times as much."""
+    points = bowl(3000)
+    drawn = np.random.default_rng(1).random(len(points))
+    surface = BallPivot().run(points[(points[:, 0] < 0) | (drawn < share)], box(), TOLERANCE, 0.3, NOISE)
+    middle = surface.triangles.mean(axis=1)
+    far = np.linalg.norm(middle - [0, 0, TOP], axis=1)
+    for half in (middle[:, 0] < 0, middle[:, 0] > 0):
+        assert np.average(far[half], weights=np.linalg.norm(surface.cross[half], axis=1)) == pytest.approx(
+            RADIUS, rel=0.005
+        )
+
+
 def test_a_ball_too_small_for_the_points_gives_no_surface() -> None:
     with pytest.raises(StageError, match="gives no inner damage surface") as caught:
         BallPivot(radii=(0.01,)).run(bowl(), box(), TOLERANCE, 0.15, NOISE)
@@ -83,11 +97,14 @@ def test_too_few_points_are_refused() -> None:
     assert caught.value.remedy
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureFixture[str]) -> None:
     part = box()
     tool = {"tool": "sphere", "centre": [0, 0, TOP], "radius": RADIUS}
-    scanner = Simulate.model_validate({"damage": [tool], "points": 8000, "noise": 0.04, "density": density})
+    scanner = Simulate.model_validate(
+        {"damage": [tool], "points": 30000 if density else 8000, "noise": 0.04, "density": density}
+    )
     job = {"version": 1, "method": "surface", "tolerance": TOLERANCE, "align": "none", "reconstruct": "ball_pivot"}
     result = damageest.run(job, part=part, scan=scanner.run("mm", part))
     assert result.truth is not None

@@ -119,6 +119,7 @@ def test_fewer_levels_give_a_rounder_body() -> None:
     assert coarse < fine - 0.02
 
 
+@pytest.mark.slow
 def test_a_side_without_points_is_refused() -> None:
     points = scan_box("half ball")
     with pytest.raises(StageError, match="not watertight") as caught:

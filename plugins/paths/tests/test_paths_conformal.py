@@ -62,6 +62,7 @@ def list_layers(plan: Plan) -> list[tuple[int, Floats]]:
     return [(k, to_part(plan, np.concatenate([sample(one) for one in plan.passes if one.layer == k]))) for k in numbers]
 
 
+@pytest.mark.slow
 def test_layers_of_a_bore_are_cylinders_about_its_axis() -> None:
     _, plan = plan_cavity("groove")
     assert plan.height == pytest.approx(DEPTH / 3, rel=0.01)
@@ -73,6 +74,7 @@ def test_layers_of_a_bore_are_cylinders_about_its_axis() -> None:
         assert radius == pytest.approx(np.full(len(points), BORE + DEPTH - (number + 1) * plan.height), abs=0.01)
 
 
+@pytest.mark.slow
 def test_layers_of_a_bowl_are_spheres_about_its_centre() -> None:
     _, plan = plan_cavity("bowl")
     for number, points in list_layers(plan):
@@ -80,6 +82,7 @@ def test_layers_of_a_bowl_are_spheres_about_its_centre() -> None:
         assert radius == pytest.approx(np.full(len(points), BALL - (number + 1) * plan.height), abs=0.02)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", MAKERS)
 def test_each_point_is_as_far_from_the_floor_as_its_layer(name: str) -> None:
     scene = prepare(MAKERS[name]())
@@ -89,6 +92,7 @@ def test_each_point_is_as_far_from_the_floor_as_its_layer(name: str) -> None:
         assert depth == pytest.approx(np.full(len(depth), (one.layer + 1) * plan.height), abs=0.01)
 
 
+@pytest.mark.slow
 def test_the_tool_follows_the_normal_up_to_its_limit() -> None:
     scene = prepare(groove(), tilt=np.radians(30.0))
     plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
@@ -120,6 +124,7 @@ def test_a_flat_floor_gives_planes() -> None:
     assert found.missing_volume == pytest.approx(planar.missing_volume, abs=0.01 * scene.body.volume())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("pattern", ["contour", "spiral", pytest.param("offset-zigzag", marks=pytest.mark.slow)])
 def test_rows_and_rings_are_a_step_apart_on_the_surface(pattern: Any) -> None:
     """The beads, 2 wide and drawn on the bowl, leave nothing of it."""
@@ -163,17 +168,20 @@ def make_walled_notch() -> Loss:
     return Loss(lost, left)
 
 
+@pytest.mark.slow
 def test_a_build_direction_that_leaves_more_than_half_is_refused() -> None:
     with pytest.raises(StageError, match="more than half of it"):
         plan_whole(make_walled_notch(), layers="conformal", axes=5, direction="normal")
 
 
+@pytest.mark.slow
 def test_of_the_build_directions_that_is_taken_which_fills_far_more() -> None:
     path = plan_whole(make_walled_notch(), layers="conformal", axes=5, direction="auto", simulate=False)
     assert path.unreached_volume < 0.1 * path.deposit_volume
     assert path.directions[0] == pytest.approx([0, 0, 1])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("loss", "width", "height"),
     [(crescent(5.0, 3.0), 1.4, 0.5), pytest.param(crescent(18.0, 16.0), 1.0, 0.35, marks=pytest.mark.slow)],
@@ -205,6 +213,7 @@ def test_a_floor_with_a_step_is_refused() -> None:
     assert plan.missing_volume == pytest.approx(scene.body.volume())
 
 
+@pytest.mark.slow
 def test_a_scrap_of_floor_on_a_wall_is_not_followed() -> None:
     """Scans leave such scraps; each made a cliff of the layers, and they were refused."""
     scene = prepare(ledge())
@@ -215,6 +224,7 @@ def test_a_scrap_of_floor_on_a_wall_is_not_followed() -> None:
     assert plan.missing_volume < 0.04 * scene.body.volume()
 
 
+@pytest.mark.slow
 def test_layers_are_torn_at_a_low_step_and_what_has_no_bead_there_is_told() -> None:
     scene = prepare(low_stair())
     plan = plan_conformal(scene.body, scene.frame, scene.around, scene.process)
@@ -227,6 +237,7 @@ def test_layers_are_torn_at_a_low_step_and_what_has_no_bead_there_is_told() -> N
     assert beads + plan.missing_volume > 0.9 * scene.body.volume()
 
 
+@pytest.mark.slow
 def test_another_plan_is_asked_for_before_beads_are_laid() -> None:
     """What no layer covers is known by then, and is the least that can be missing."""
     scene = prepare(low_stair())
@@ -243,6 +254,7 @@ def make_slot(width: float) -> Loss:
     return cut(block, Manifold.cube((width, 60, 20)).translate((-width / 2, -30, -8)))
 
 
+@pytest.mark.slow
 def test_layers_that_would_leave_more_than_half_are_refused() -> None:
     """A deep slot: the nozzle does not come to its bottom, and what lies above has nothing to stand on."""
     narrow = make_slot(3.0)
@@ -255,6 +267,7 @@ def test_layers_that_would_leave_more_than_half_are_refused() -> None:
         plan_whole(narrow, layers="conformal", axes=3)
 
 
+@pytest.mark.slow
 def test_layers_that_leave_little_of_a_slot_are_not_refused() -> None:
     path = plan_whole(make_slot(8.0), layers="conformal", axes=5, simulate=False)
     assert path.unreached_volume < 0.5 * path.deposit_volume
@@ -267,6 +280,7 @@ def test_no_floor_no_passes() -> None:
     assert [why for why in plan.reasons if "faces the build direction" in why]
 
 
+@pytest.mark.slow
 def test_the_same_twice() -> None:
     scene, (_, first) = prepare(tip()), plan_cavity("tip")
     second = plan_conformal(scene.body, scene.frame, scene.around, scene.process)

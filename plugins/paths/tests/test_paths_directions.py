@@ -57,6 +57,7 @@ def test_trials_given_up_are_those_of_no_chosen_direction(loss: Loss, monkeypatc
     assert plan.missing_volume == whole.missing_volume
 
 
+@pytest.mark.slow
 def test_of_floors_that_leave_much_uncovered_the_one_that_leaves_least_is_filled(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

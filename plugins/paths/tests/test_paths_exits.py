@@ -46,6 +46,7 @@ def is_beside(corners: Floats, part: Solid) -> bool:
     return bool((corners.min(axis=0) > high).any() or (corners.max(axis=0) < low).any())
 
 
+@pytest.mark.slow
 def test_with_5_axes_the_tool_leaves_a_fork_sideways() -> None:
     loss, path = plan_fork(5)
     _, straight = plan_fork(3)
@@ -62,6 +63,7 @@ def test_with_3_axes_the_tool_comes_from_above() -> None:
         assert path.points[k][0] + path.standoff > loss.left.bounds[1][0]
 
 
+@pytest.mark.slow
 def test_where_the_sides_are_shut_the_tool_leaves_along_its_axis() -> None:
     loss, path = plan_fork(5, with_lids=True)
     assert path.travel_clearance > 0

@@ -39,6 +39,7 @@ def plan_all(loss: Loss) -> dict[str, DepositPath]:
     return {form: plan(loss, direction=UP, axes=5, layers=form) for form in ("auto", "planar")}
 
 
+@pytest.mark.slow
 def test_where_planes_lose_much_layers_follow_the_floor(joined: list[int]) -> None:
     loss = dent()
     paths = plan_all(loss)
@@ -49,12 +50,14 @@ def test_where_planes_lose_much_layers_follow_the_floor(joined: list[int]) -> No
     assert measure_nozzle(paths["auto"], loss.left, 0.2) > 0
 
 
+@pytest.mark.slow
 def test_on_a_flat_floor_layers_are_planes() -> None:
     paths = plan_all(pocket())
     assert paths["auto"].layer_form == "planar"
     assert np.array_equal(paths["auto"].points, paths["planar"].points)
 
 
+@pytest.mark.slow
 def test_what_no_layer_would_reach_asks_for_no_other_layers(monkeypatch: pytest.MonkeyPatch) -> None:
     """A nozzle for which the lower half is out of reach: the trial, which would take long, is not made."""
     monkeypatch.setitem(PLANNERS, "conformal", None)
@@ -65,6 +68,7 @@ def test_what_no_layer_would_reach_asks_for_no_other_layers(monkeypatch: pytest.
     assert len(path.points)
 
 
+@pytest.mark.slow
 def test_the_form_is_that_which_is_asked_for() -> None:
     assert plan(dent(), direction=UP, layers="planar", simulate=False).layer_form == "planar"
     assert plan(pocket(), direction=UP, layers="conformal", simulate=False).layer_form == "conformal"

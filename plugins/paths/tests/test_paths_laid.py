@@ -29,6 +29,7 @@ def get_fill(path: DepositPath) -> BeadFill:
     return path.fill
 
 
+@pytest.mark.slow
 def test_beads_as_planned_fill_what_is_planned() -> None:
     plain, laid = plan_dent(), plan_dent(600.0)
     # layers are made equal, so that they are a little lower than 1
@@ -36,6 +37,7 @@ def test_beads_as_planned_fill_what_is_planned() -> None:
     assert laid.bead_volume == pytest.approx(plain.bead_volume / plain.heights[0], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_small_beads_leave_gaps() -> None:
     plain, laid = plan_dent(), plan_dent(1200.0)
     assert get_fill(plain).filled > 0.99
@@ -45,6 +47,7 @@ def test_small_beads_leave_gaps() -> None:
     assert laid.surplus_volume == 0
 
 
+@pytest.mark.slow
 def test_large_beads_stand_out_and_a_note_says_so() -> None:
     plain, laid = plan_dent(), plan_dent(300.0)
     assert get_fill(laid).spill > 1.3 * get_fill(plain).spill

@@ -59,6 +59,7 @@ def test_length_time_and_volume_are_those_of_the_moves() -> None:
     assert path.bead_volume > path.deposit_volume
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("pattern", ["contour", "spiral", "offset-zigzag"])
 def test_other_patterns_fill_it_too(pattern: str) -> None:
     path = plan(dent(), direction=UP, pattern=pattern)
@@ -89,6 +90,7 @@ def measure_gap(path: DepositPath, obstacle: Mesh) -> float:
     return float(found)
 
 
+@pytest.mark.slow
 def test_the_nozzle_keeps_its_clearance() -> None:
     loss = slot()
     rod = {**NOZZLE, "tip_radius": 0.4, "cone_angle": 0.0, "body_radius": 0.4}
@@ -98,6 +100,7 @@ def test_the_nozzle_keeps_its_clearance() -> None:
     assert measure_gap(path, loss.left) >= path.clearance - 1e-6
 
 
+@pytest.mark.slow
 def test_what_a_fat_nozzle_does_not_reach_is_listed_with_its_volume() -> None:
     loss = slot()
     rod = {**NOZZLE, "tip_radius": 0.4, "cone_angle": 0.0, "body_radius": 0.4}
@@ -119,12 +122,14 @@ def test_what_hangs_in_the_air_is_not_built() -> None:
     assert path.unreached_volume > 0.5 * path.deposit_volume
 
 
+@pytest.mark.slow
 def test_the_direction_is_found() -> None:
     found = plan(dent(), simulate=False)
     assert found.directions[0] == pytest.approx(UP, abs=1e-3)
     assert plan(dent(), direction="normal", simulate=False).directions[0] == pytest.approx(UP, abs=1e-3)
 
 
+@pytest.mark.slow
 def test_another_deposit_and_a_fixture_are_kept_clear_of(tmp_path: Any) -> None:
     import trimesh
 
@@ -141,6 +146,7 @@ def test_another_deposit_and_a_fixture_are_kept_clear_of(tmp_path: Any) -> None:
     assert measure_gap(held, solid) >= held.clearance - 1e-6
 
 
+@pytest.mark.slow
 def test_the_same_twice() -> None:
     loss = cut(BLOCK, Manifold.cube((16, 14, 9)).translate((14, 9, -3)))
     first, second = plan(loss), plan(loss)
@@ -148,6 +154,7 @@ def test_the_same_twice() -> None:
     assert first.axes.tobytes() == second.axes.tobytes()
 
 
+@pytest.mark.slow
 def test_short_passes_are_left_out_and_listed() -> None:
     path = plan(dent(), direction=UP, min_length=30.0, simulate=False)
     assert any("shortest pass" in item.why for item in path.unreached)
@@ -188,6 +195,7 @@ def plan_along(name: str) -> tuple[Loss, DepositPath]:
     return loss, plan(loss, layers="conformal", axes=5, direction=UP)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["bowl", pytest.param("groove", marks=pytest.mark.slow), "tip"])
 def test_layers_along_the_floor_fill_the_deposit(name: str) -> None:
     loss, path = plan_along(name)
@@ -225,6 +233,7 @@ def test_a_floor_that_cannot_be_followed_is_refused() -> None:
         plan(stair(), layers="conformal", direction=UP)
 
 
+@pytest.mark.slow
 def test_a_nozzle_from_a_mesh(tmp_path: Any) -> None:
     import trimesh
 

@@ -49,6 +49,7 @@ def measure(clearance: Clearance, triangles: Floats, point: Floats, axis: Floats
     return 0.0 if inside.any() else clearance.measure(point, axis)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("cone", CONES.values(), ids=CONES)
 @settings(deadline=None)  # the first call compiles
 @given(seed=st.integers(0, 10**6), needed=st.floats(0.05, 3.0))

@@ -32,8 +32,8 @@ def make_lip_and_boss() -> Loss:
 @pytest.mark.slow
 def test_three_and_two_axes_build_parts_with_a_direction_each() -> None:
     loss = make_lip_and_boss()
-    three = plan(loss, axes=3)
-    parts = plan(loss, axes="3+2", machine={"tilt": 89.9})
+    three = plan(loss, axes=3, layers="auto")
+    parts = plan(loss, axes="3+2", layers="auto", machine={"tilt": 89.9})
     assert three.unreached_volume > 0.05 * loss.lost.volume
     assert parts.unreached_volume < 0.5 * three.unreached_volume
     assert len(parts.directions) >= 2
@@ -142,6 +142,7 @@ def test_the_tool_leaves_from_above_another_pass() -> None:
     assert moves.points[-1][0] == pytest.approx(0)
 
 
+@pytest.mark.slow
 def test_a_way_out_that_is_blocked_is_counted() -> None:
     room = Manifold.cube((190, 190, 190), True) - Manifold.cube((160, 160, 160), True)
     moves = leave(room)

@@ -80,6 +80,7 @@ def find_rest(path: DepositPath) -> Floats:
     return found
 
 
+@pytest.mark.slow
 def test_rings_bend_as_they_are_wide() -> None:
     path, _ = cut_moves(plan_rings())
     found = measure_radius(path)
@@ -121,6 +122,7 @@ def test_the_time_since_the_neighbour_is_that_of_all_pairs() -> None:
     assert np.abs(found[both] - expected[both]).max() < 0.3
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("least", [5.0, 40.0])
 def test_neighbours_have_the_time_to_cool_down(least: float) -> None:
     before, path = plan_rings(), plan_rings(interpass=least)
@@ -134,6 +136,7 @@ def test_neighbours_have_the_time_to_cool_down(least: float) -> None:
     assert path.dwell.max() <= least
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(
     ("loss", "pattern"),
     [
@@ -183,6 +186,7 @@ def test_the_last_row_that_holds_for_a_place_counts() -> None:
     assert np.array_equal(path.values[starts], path.values[starts + 1])
 
 
+@pytest.mark.slow
 def test_files_have_waits_and_beads(tmp_path: Path) -> None:
     path = plan(dent(), direction=UP, simulate=False, interpass=30.0, calibration=TRIALS, process=[
         {"set": {"power": 1000.0}}, {"layer": 1, "set": {"power": 1500.0}},
@@ -238,6 +242,7 @@ def test_width_and_height_follow_from_trials() -> None:
     assert made.width == OPTIONS["width"]
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize(
     ("given_", "words"),
     [

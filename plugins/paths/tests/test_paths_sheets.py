@@ -37,6 +37,7 @@ def make_rough_floor() -> Floor:
     return make_floor(vertices, faces, 1.2)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("make", [bowl, groove, stair])
 def test_reach_is_the_least_distance_within_a_layer(make: Callable[[], Loss]) -> None:
     scene = prepare(make())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 from damageest_paths.clearance import Clearance
 from damageest_paths.network import Way, measure_way
 from damageest_paths.nozzle import Cone, make_nozzle
@@ -27,6 +28,7 @@ def make_clearance(post: float) -> Clearance:
     return Clearance(make_nozzle(Cone(1.0, 3.0, 25.0, 0.4)), 3.0, obstacles).during_travel()
 
 
+@pytest.mark.slow
 @given(st.integers(0, 10**6), st.sampled_from([0.5, 12.0, 30.0]))
 @settings(max_examples=12, deadline=None)
 def test_a_way_gets_shorter_and_stays_clear(seed: int, post: float) -> None:

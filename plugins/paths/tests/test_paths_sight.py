@@ -58,6 +58,7 @@ def measure_beam(path: DepositPath, metal: Solid) -> float:
     return float(hit.mean())
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", CASES)
 def test_no_metal_is_in_the_beam(name: str) -> None:
     loss, path = make_case(name)
@@ -116,6 +117,7 @@ def test_what_a_roof_shades_is_unreached_and_says_why() -> None:
     assert free.unreached_volume < 0.01 * free.deposit_volume
 
 
+@pytest.mark.slow
 def test_a_wider_beam_keeps_away_from_a_wall() -> None:
     """A step before a wall: the beam of a cone needs room beside it that a thin one does not."""
     wall = Manifold.cube((4, 30, 4)).translate((8, -15, 0))
@@ -148,6 +150,7 @@ def test_a_strip_too_narrow_beside_a_wall_is_listed(rise: float) -> None:
     assert path.fill.of_deposit + listed + path.fill.gap / path.deposit_volume == pytest.approx(1, abs=0.02)
 
 
+@pytest.mark.slow
 def test_over_build_is_said() -> None:
     path = plan(corner(), direction=(0.6, 0.48, 0.64))
     assert path.surplus_volume > 0.1 * path.deposit_volume

@@ -70,6 +70,7 @@ def plan_passage(turn: float) -> DepositPath:
     return plan(make_passage(), direction=(0, 0, 1), axes=5, nozzle=fat, machine={"turn": turn}, turn=0.0)
 
 
+@pytest.mark.slow
 def test_turning_saves_cuts_and_touches_nothing() -> None:
     turning, still = plan_passage(20.0), plan_passage(0.0)
     assert turning.unreached_volume <= still.unreached_volume + 1e-9

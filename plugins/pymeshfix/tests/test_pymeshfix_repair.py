@@ -138,6 +138,7 @@ def test_same_mesh_same_bytes_and_no_output(capfd: pytest.CaptureFixture[str]) -
     assert capfd.readouterr() == ("", "")
 
 
+@pytest.mark.slow
 def test_a_whole_job_with_it_comes_near_the_truth() -> None:
     mesh = trimesh.creation.box((40, 30, 20))
     part = damageest.artefacts.Part(mesh.vertices, mesh.faces)

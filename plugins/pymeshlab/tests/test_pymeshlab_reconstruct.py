@@ -69,6 +69,7 @@ def test_normals_toward_the_lost_material(made: tuple[str, Surface]) -> None:
     assert (np.einsum("ij,ij->i", made[1].cross, inward) > 0).mean() > 0.99
 
 
+@pytest.mark.slow
 def test_same_points_same_surface_and_no_output(made: tuple[str, Surface], capfd: pytest.CaptureFixture[str]) -> None:
     again = reconstruct(made[0])
     # The grid of the MLS filters depends on the layout of memory: it moves by 4e-7, and single vertices by more.
@@ -98,11 +99,14 @@ def test_a_ball_too_small_for_the_points_gives_no_surface() -> None:
         )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("density", [0.0, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_a_whole_job_comes_near_the_truth(density: float, capfd: pytest.CaptureFixture[str]) -> None:
     part = box()
     tool = {"tool": "sphere", "centre": [0, 0, TOP], "radius": RADIUS}
-    scanner = Simulate.model_validate({"damage": [tool], "points": 8000, "noise": 0.04, "density": density})
+    scanner = Simulate.model_validate(
+        {"damage": [tool], "points": 30000 if density else 8000, "noise": 0.04, "density": density}
+    )
     job = {"version": 1, "method": "surface", "tolerance": TOLERANCE, "align": "none", "boolean": "pymeshlab"}
     result = damageest.run(job | {"reconstruct": "pymeshlab"}, part=part, scan=scanner.run("mm", part))
     assert result.truth is not None

@@ -163,6 +163,7 @@ def test_any_text_is_written(tmp_path_factory: pytest.TempPathFactory, result: R
     etree.parse(folder / "result.qif")
 
 
+@pytest.mark.slow
 def test_a_job_writes_it_without_solids(small_done: Path, schema: etree.XMLSchema) -> None:
     small_done.write_text(small_done.read_text() + "export: {format: [qif]}\n")
     out = small_done.parent / "out" / "job"
@@ -178,6 +179,7 @@ def test_a_job_writes_it_without_solids(small_done: Path, schema: etree.XMLSchem
     assert not [name for name in files if name.endswith(".stl")]
 
 
+@pytest.mark.variants(slow=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(path.stem for path in JOBS.glob("*.yaml")))
 def test_every_example_job_is_valid(tmp_path: Path, schema: etree.XMLSchema, name: str) -> None:

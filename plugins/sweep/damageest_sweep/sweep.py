@@ -13,7 +13,7 @@ from damageest.geometry.distance import is_inside
 from damageest.geometry.vectors import normalise
 from damageest.stages.enclose import Enclose
 
-REMEDY = "enclose: adaptive"
+REMEDY = "enclose: divide"
 MOST_FLAWED = 0.02
 """Share, of area or of points, up to which a check may fail: so much is a flaw of the scan, not the damage's shape."""
 

@@ -34,6 +34,7 @@ def read_solids(folder: Path) -> dict[str, bytes]:
     }
 
 
+@pytest.mark.slow
 def test_a_part_as_designed_is_not_even_tried(small_done: Path, tmp_path: Path, monkeypatch: Any) -> None:
     def refuse(*_: Any) -> AdaptedPart | None:
         raise AssertionError("it was tried")
@@ -78,6 +79,7 @@ def test_a_field_that_would_fold_the_part_leaves_the_rigid_result(tmp_path: Path
         damageest.run(JOB, part=PART, scan=given, settings=["adapt=smooth"])
 
 
+@pytest.mark.slow
 def test_a_bent_part_is_adapted(tmp_path: Path) -> None:
     found = damageest.run(
         JOB | {"align": "none"},

@@ -56,6 +56,7 @@ def test_the_skin_that_another_field_has_deeper_is_measured() -> None:
     assert found.volume == pytest.approx(0.4 * 2 * 40 * 30)
 
 
+@pytest.mark.slow
 def test_wear_that_a_thinner_part_would_look_like_is_told() -> None:
     adapted, _ = adapt("worn", bend=1.0)
     assert adapted is not None

@@ -44,11 +44,13 @@ def adapt(damage: str = "", **deform: float) -> tuple[AdaptedPart | None, Floats
     return adapted, signed_distance(given.move(adapted.motion).points, adapted.part)[0]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("damage", ["sphere", "worn", pytest.param("", marks=pytest.mark.slow)])
 def test_a_part_as_designed_is_not_deformed(damage: str) -> None:
     assert adapt(damage)[0] is None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "deform", [{"bend": 1.0}, *(pytest.param({how: 0.6}, marks=pytest.mark.slow) for how in ("stretch", "scale"))]
 )
@@ -63,6 +65,7 @@ def test_a_deformed_part_is_followed_and_its_loss_stays(deform: dict[str, float]
     assert 0.5 * amount < adapted.amount < 1.5 * amount
 
 
+@pytest.mark.slow
 def test_wear_of_a_face_stays_on_a_bent_part() -> None:
     adapted, distance = adapt("worn", bend=1.0)
     assert adapted is not None
@@ -72,6 +75,7 @@ def test_wear_of_a_face_stays_on_a_bent_part() -> None:
     assert np.median(distance[worn]) == pytest.approx(-2 * TOLERANCE, abs=0.3 * TOLERANCE)
 
 
+@pytest.mark.slow
 def test_the_field_has_no_rigid_part_over_the_seen_skin() -> None:
     adapted, _ = adapt("sphere", bend=1.0)
     assert adapted is not None
@@ -88,6 +92,7 @@ def test_its_field_says_where_each_place_went() -> None:
     assert np.abs(adapted.field.displace(before) - adapted.displacement).max() < 0.1 * TOLERANCE
 
 
+@pytest.mark.slow
 def test_what_is_not_seen_is_known_less_exactly() -> None:
     whole = scan([SPHERE], bend=1.0)
     half = whole.take(whole.points[:, 0] < 4)

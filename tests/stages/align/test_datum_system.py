@@ -62,6 +62,7 @@ def name_motions(pose: Pose) -> str:
     )
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("name", LEFT)
 def test_what_stays_free_is_named(name: str) -> None:
     part, datum, left = LEFT[name]
@@ -104,6 +105,7 @@ def test_precedence_decides_which_datum_gives_way() -> None:
     assert turns[1] == pytest.approx(lean, rel=0.05)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "points"), [("cuboid", 12_000), pytest.param("half_torus", 60_000, marks=pytest.mark.slow)]
 )

@@ -72,6 +72,7 @@ def test_unworn_skin_fixes_the_pose(kind: str, part: str, amount: float) -> None
     assert not pose.doubts
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("kind", "worn"), [("one face", 2.0), ("both faces", 4.0)])
 def test_a_plate_is_free_across_its_worn_faces(kind: str, worn: float) -> None:
     part, scan, tolerance = scan_worn(kind, "plate", 2.0)
@@ -87,6 +88,7 @@ def test_a_plate_is_free_across_its_worn_faces(kind: str, worn: float) -> None:
     assert motion.low - 0.2 * tolerance < -up < motion.high + 0.2 * tolerance
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("points", [20_000, 30_000])
 def test_worn_faces_taken_as_sound_leave_the_pose_free(points: int) -> None:
     """Both faces are worn by as much, and the pose found puts one of them on the skin: then the few faces that are not
@@ -104,6 +106,7 @@ def test_worn_faces_taken_as_sound_leave_the_pose_free(points: int) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_plate_worn_to_a_wedge_is_free_to_turn() -> None:
     part, scan, tolerance = scan_worn("wedge", "plate", 3.0)
     pose = align(part, scan, tolerance)
@@ -154,6 +157,7 @@ def test_a_datum_that_is_not_there(datum: list[object], text: str) -> None:
         align(part, unseen, tolerance, datum=datum)
 
 
+@pytest.mark.slow
 def test_faces_of_the_cad_as_a_datum() -> None:
     part, scan, tolerance = scan_worn("one face", "plate", 2.0)
     down = (part.face_normals[:, 2] < -0.9).astype(int)
@@ -208,6 +212,7 @@ def test_points_of_something_else_hold_nothing() -> None:
         assert np.isfinite(finish_pose(frame, cloud, best, 1e-4, 1e-3, "mm").fit.pose).all()
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("name", "seed"), [("lever", 0), ("ribbed_plate", 0), ("block", 2)])
 def test_errors_of_a_depth_camera_are_no_wear(name: str, seed: int) -> None:
     """Errors that points of a region share leave as much outside as inside. The pose is not moved until all lies

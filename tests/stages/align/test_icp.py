@@ -22,6 +22,7 @@ def near(part: Part, scan: Scan, degrees: float, shift: float) -> list[list[floa
     return np.asarray(D @ scan.truth.T_part_scan).tolist()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["block", pytest.param("blade", marks=pytest.mark.slow)])
 def test_damage_does_not_shift_the_fit(name: str) -> None:
     part, scan = scene(name, seed=1, missing=0.33)
@@ -31,6 +32,7 @@ def test_damage_does_not_shift_the_fit(name: str) -> None:
     assert pose.T_part_scan.tobytes() == stage.run(scan, part, 4 * scan.noise).T_part_scan.tobytes()
 
 
+@pytest.mark.slow
 def test_no_pose_given_and_scan_in_place() -> None:
     part, scan = scene("block", seed=2)
     assert scan.truth is not None

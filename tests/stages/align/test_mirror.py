@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
+import trimesh
 from align_scenes import cut_strip, make_bracket, measure_apart, scene, watch_by_camera
 
 from damageest.artefacts import Part, Scan
 from damageest.errors import StageError
+from damageest.geometry.sampling import sample_by_area
 from damageest.stages.align.none import KnownPose
 from damageest.stages.align.register import Register
 
@@ -41,6 +44,7 @@ def test_a_strip_of_a_mirror_image_is_not_refused() -> None:
     assert not is_refused(part, mirror(scan), 4 * scan.noise)
 
 
+@pytest.mark.slow
 def test_a_mirror_image_in_a_given_pose_is_refused() -> None:
     """The pose is the one in which most of it lies on the part; part of what is mirrored lies outside."""
     part, scan = scene("block", 50, points=8000)
@@ -50,6 +54,7 @@ def test_a_mirror_image_in_a_given_pose_is_refused() -> None:
         KnownPose().run(replace(aligned, noise=scan.noise), part, 4 * scan.noise)
 
 
+@pytest.mark.variants(slow=8)
 @pytest.mark.slow
 @pytest.mark.parametrize("k", range(24))
 def test_right_strips_are_not_refused(k: int) -> None:
@@ -60,9 +65,30 @@ def test_right_strips_are_not_refused(k: int) -> None:
     assert not is_refused(part, scan, 4 * scan.noise)
 
 
+@pytest.mark.variants(slow=5)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(50, 53))
 @pytest.mark.parametrize("name", ["ribbed_plate", "block", "blade", "tube"])
 def test_mirror_images_of_parts_well_seen_are_refused(name: str, seed: int) -> None:
     part, scan = scene(name, seed, missing=0.05 * (seed % 2), unseen=0.4 * (seed % 3 == 0), points=20_000)
     assert is_refused(part, mirror(scan), 4 * scan.noise)
+
+
+def make_hook() -> Part:
+    """A stem with an arm and a foot in different directions, each of its own length: no plane mirrors it nearly."""
+    boxes = [trimesh.creation.box(size) for size in ((60, 8, 8), (8, 30, 8), (8, 8, 18))]
+    for one, at in zip(boxes, ((0, 0, 0), (26, 15, 0), (-20, 0, 10)), strict=True):
+        one.apply_translation(at)
+    hook = trimesh.boolean.union(boxes, engine="manifold")
+    return Part(hook.vertices, hook.faces)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(3))
+def test_the_other_hand_of_an_undamaged_part_is_refused_and_its_own_is_not(seed: int) -> None:
+    part, rng = make_hook(), np.random.default_rng(seed)
+    points = sample_by_area(part, 12_000, rng)[0] + rng.normal(0, 0.03, (12_000, 3))
+    turn = trimesh.transformations.random_rotation_matrix(rng.random(3))[:3, :3]
+    scan = Scan(points @ turn.T + rng.uniform(-50, 50, 3), noise=0.03)
+    assert is_refused(part, mirror(scan), 0.15)
+    assert not is_refused(part, scan, 0.15)

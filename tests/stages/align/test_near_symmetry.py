@@ -54,6 +54,7 @@ def scene_points(part: Part) -> np.ndarray:
     return points + rng.normal(0, 0.05, points.shape)
 
 
+@pytest.mark.variants(slow=6)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(1, 21))
 def test_no_camera_scan_is_turned_and_sure(seed: int) -> None:

@@ -37,6 +37,7 @@ def test_elsewhere_is_refused() -> None:
         KnownPose().run(scan, part, 4 * scan.noise)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("missing", [0.33, pytest.param(0.0, marks=pytest.mark.slow)])
 def test_a_millimetre_off_is_refused_and_a_fraction_of_the_tolerance_is_not(missing: float) -> None:
     part, scan = scene("block", seed=1, missing=missing)

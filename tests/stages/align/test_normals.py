@@ -36,6 +36,7 @@ def outward() -> tuple[Part, Scan]:
     return part, replace(aligned, normals=normals).take(order).move(np.linalg.inv(T))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "kind", ["random", *(pytest.param(kind, marks=pytest.mark.slow) for kind in ("right", "flipped", "views"))]
 )

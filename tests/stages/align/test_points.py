@@ -26,6 +26,7 @@ def pick(part: Part, scan: Scan, count: int, off: float) -> list[list[list[float
     return [[a.tolist(), b.tolist()] for a, b in zip(seen, corners, strict=True)]
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("count", [3, 5])
 def test_rough_pairs_are_enough(count: int) -> None:
     part, scan = scene("block", seed=1, missing=0.2)

@@ -28,6 +28,7 @@ def test_pose_with_a_third_missing(name: str) -> None:
     assert 0.5 * scan.noise < pose.rms < 2 * scan.noise
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "points", [2000, *(pytest.param(points, marks=pytest.mark.slow) for points in (9999, 10_000, 10_001))]
 )
@@ -129,6 +130,7 @@ def test_a_scan_that_does_not_fix_the_pose_is_noted() -> None:
     assert not any("does not fix" in note for note in whole.notes)
 
 
+@pytest.mark.slow
 def test_discrete_symmetry_is_noted() -> None:
     part, scan = scene("cuboid", seed=7, missing=0.05, points=8000)
     pose = Register().run(scan, part, 4 * scan.noise)

@@ -71,6 +71,7 @@ def make_case(seed: int) -> tuple[Part, Solid, dict[str, Any], Deposit]:
 
 
 # every ninth one of the first fifty by default; the others by -m slow
+@pytest.mark.variants(1, slow=20)
 @pytest.mark.parametrize(
     "seed", [pytest.param(seed, marks=pytest.mark.slow) if seed % 9 or seed > 40 else seed for seed in range(CASES)]
 )
@@ -105,6 +106,7 @@ POSE[:3, 3] = (130, -50, 290)
 
 
 # four of 120 had edges of four triangles; they are among 3, 10, 38, 50, 67, 79, of which two are by default
+@pytest.mark.variants(slow=30)
 @pytest.mark.parametrize(
     "seed",
     [pytest.param(seed, marks=[] if seed in (10, 50) else pytest.mark.slow) for seed in range(120)],

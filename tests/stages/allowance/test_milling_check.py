@@ -28,7 +28,7 @@ def run_check(stock: Any, hole: Any = BITE, target: StockTarget = TOP) -> tuple[
     plan = StockPlan(0.0, (target,), ())
     skin = take_skin(Solid(*to_arrays(BITE)), part, plan, np.zeros(3))
     work = DepositGeometry(hole + stock, BITE, stock, block() - BITE, Manifold(), skin, None, np.zeros(3))
-    return check_deposit(work, part, TOLERANCE, [])
+    return check_deposit(work, part, TOLERANCE, [])[0]
 
 
 def slab(height: float, low: float = 0.0) -> Any:

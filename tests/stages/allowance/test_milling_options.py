@@ -151,6 +151,7 @@ def test_overlap_stays_on_its_side_of_a_thin_wall() -> None:
     assert deposit.bounds[0][2] == pytest.approx(0.5)
 
 
+@pytest.mark.slow
 def test_cut_back_removes_intact_metal_up_to_inner() -> None:
     tool = Manifold.sphere(4, 64).translate((15, 10, 12))
     body, inner = block(), 0.6
@@ -168,6 +169,7 @@ def test_cut_back_removes_intact_metal_up_to_inner() -> None:
     assert far.max() < inner + TOLERANCE / 2
 
 
+@pytest.mark.slow
 def test_a_deep_cut_back_of_a_pocket_has_the_volume_of_the_offset() -> None:
     """Thirty tolerances deep, round an L, whose inner corner gives the offset a crease."""
     inner, depth, block_ = 3.0, 2.0, Manifold.cube((60, 60, 20))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from typing import Any
 
@@ -10,6 +11,7 @@ import pytest
 from manifold3d import Manifold
 
 from damageest.errors import StageError
+from damageest.geometry.bodies import split_shells
 from damageest.geometry.solids import to_manifold
 from tests.stages.allowance.shapes import (
     INSET,
@@ -20,6 +22,7 @@ from tests.stages.allowance.shapes import (
     comb,
     deposit_on,
     dovetail,
+    make_damage,
     nearest,
     part_of,
     skin_points,
@@ -74,6 +77,7 @@ def test_an_intact_wall_in_the_way_is_refused() -> None:
     assert (to_manifold(deposit) ^ left).volume() < 1e-6
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("less", "error", "fits"), [(0.0, 0.003, True), (0.0, 0.0, False), (0.05, 0.003, False)])
 def test_a_pin_that_touches_its_bore_is_no_gap_without_room(less: float, error: float, fits: bool) -> None:
     """Between their triangles, which are not the same, slits are left that neither of them has. A real gap is none."""
@@ -109,6 +113,7 @@ def test_stock_that_is_clipped_everywhere_has_the_thickness_of_the_room() -> Non
     assert not any("ask for no stock" in note for note in deposit.notes)
 
 
+@pytest.mark.slow
 def test_a_bore_that_stock_closes_is_filled_to_its_axis() -> None:
     tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
     inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
@@ -124,3 +129,40 @@ def test_stock_between_two_damaged_walls_is_no_thicker_than_the_gap() -> None:
     deposit = deposit_on(comb(3.0), tool, targets=flanks, crowded="clip")
     assert deposit.thickness is not None
     assert deposit.thickness[2] == pytest.approx(3, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("body", "seed", "outer"),
+    [
+        (comb(3.0), 6, 0.5311353193740214),
+        pytest.param(blade(), 4, 2.0067369720529458, marks=pytest.mark.slow),
+    ],
+)
+def test_stock_that_overlaps_the_rim_encloses_no_bubble(body: Any, seed: int, outer: float) -> None:
+    """Where stock on the skin and stock over the rim meet, something between them stayed open."""
+    tool = make_damage(body, np.random.default_rng(seed))
+    deposit = deposit_on(body, tool, outer=outer, overlap=0.5)
+    assert not [cavity for _, cavities in split_shells(deposit) for cavity in cavities]
+
+
+def test_what_is_clipped_is_told_with_place_and_volume() -> None:
+    """Damage on one flank of a gap of 3 mm, with stock that would reach 1 mm into the other."""
+    flank = [{"facing": {"direction": [1, 0, 0], "angle": 20}, "outer": 4.0}]
+    tool = Manifold.cube((2, 6, 4)).translate((2, 4, 9))
+    with pytest.raises(StageError, match="no room for the stock"):
+        deposit_on(comb(3.0), tool, targets=flank)
+    clipped = deposit_on(comb(3.0), tool, targets=flank, crowded="clip")
+    assert re.search(r"no room for the stock at \(4, .*; clipped there: [0-9.]+ of stock in volume", clipped.notes[0])
+    told = float(re.search(r"clipped there: ([0-9.]+)", clipped.notes[0])[1])  # type: ignore[index]
+    assert told == pytest.approx(6 * 4 * 1, rel=0.05)
+
+
+def test_clip_does_not_refuse_what_it_cannot_clip() -> None:
+    """A mitre over the edge of one flank reaches the other, which is to have no stock: it is said, with the place."""
+    body = comb(3.0)
+    rng = np.random.default_rng(13)
+    tool = make_damage(body, rng)
+    with pytest.raises(StageError, match="skin around the damage that must have none"):
+        deposit_on(body, tool, outer=1.9305666644142077, overlap=1.5)
+    clipped = deposit_on(body, tool, outer=1.9305666644142077, overlap=1.5, crowded="clip")
+    assert any("that must have none, for example at (11, " in note for note in clipped.notes)

@@ -41,6 +41,7 @@ def measure_area(body: Any, height: float) -> float:
     return float(body.slice(height).area())
 
 
+@pytest.mark.slow
 def test_an_undercut_is_removed_and_nothing_else() -> None:
     ball = Manifold.sphere(6, 128).translate((0, 0, -4))
     lost, cavity, made = prepare(ball, tolerance=0.22, wall_angle=0)
@@ -55,6 +56,7 @@ def test_an_undercut_is_removed_and_nothing_else() -> None:
     assert made.volume == pytest.approx(cavity.volume(), rel=1e-4)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("angle", [15.0, 40.0])
 def test_walls_lean_outward_by_the_angle(angle: float) -> None:
     _, cavity, _ = prepare(Manifold.cube((16, 12, 12), True), wall_angle=angle)
@@ -71,11 +73,13 @@ def test_a_crack_becomes_as_wide_as_the_cutter() -> None:
     assert (lost - cavity).volume() < 1e-5 * lost.volume()
 
 
+@pytest.mark.slow
 def test_depth_is_added_below() -> None:
     _, cavity, _ = prepare(Manifold.cube((16, 12, 12), True), wall_angle=0, depth=1.5)
     assert cavity.bounding_box()[2] == pytest.approx(-7.5, abs=0.01)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("height", "is_removed"), [(3.0, True), (30.0, False)])
 def test_a_shoulder_over_the_opening_is_removed_and_a_wall_stays(height: float, is_removed: bool) -> None:
     raised = BLOCK + Manifold.cube((24, 40, height + 1)).translate((6, -20, -1))
@@ -111,6 +115,7 @@ def make_lump(radius: float) -> Any:
     return Manifold.hull_points(points)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("cutter", "tolerance"), [(1.5, TOLERANCE), pytest.param(0.3, 0.1, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("body", "place", "radius"),
@@ -135,6 +140,7 @@ def test_what_the_cutter_opens_stands_out_of_the_part_all_round(
     assert depth.min() > 0.02 * tolerance
 
 
+@pytest.mark.slow
 def test_neither_cavity_nor_milled_metal_has_crumbs(monkeypatch: pytest.MonkeyPatch) -> None:
     """A dozen of 1e-5 mm3 and less were left beside the metal milled off a gear."""
     crumb = Manifold.cube((0.01, 0.01, 0.03), True).translate((25, 15, -0.02))
@@ -177,6 +183,7 @@ def test_a_deposit_has_no_crumbs_of_stock(monkeypatch: pytest.MonkeyPatch) -> No
     assert len(to_manifold(made).decompose()) == 1
 
 
+@pytest.mark.slow
 def test_a_neighbour_across_a_gap_is_left_alone() -> None:
     """The wall of the opening, continued over the gap, cut the tip of the next tooth of a gear."""
     tooth = Manifold.cube((10, 30, 20)).translate((0, -15, -20))
@@ -189,6 +196,7 @@ def test_a_neighbour_across_a_gap_is_left_alone() -> None:
     assert made.bounds[1, 0] <= 10 + 1e-6
 
 
+@pytest.mark.slow
 def test_what_stands_over_the_damage_is_removed_across_a_gap_too() -> None:
     """As a lip over a groove: nothing reaches the damage under it."""
     lip = Manifold.cube((60, 40, 2)).translate((-30, 5, 1))

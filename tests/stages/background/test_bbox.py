@@ -24,6 +24,7 @@ def test_left_coarse_where_enclose_refines() -> None:
     assert len(BoundingBox().run(box(), dent(), 0.5, 0.1, False).faces) == 12
 
 
+@pytest.mark.slow
 def test_a_tiny_tolerance_does_not_fill_the_memory() -> None:
     assert len(BoundingBox().run(box(), dent(), 1e-4, 1e-3, True).faces) < 500_000
 

@@ -27,6 +27,7 @@ def test_holds_a_block_of_any_shape() -> None:
         assert nearest > 0.9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "how", ["loop", "adaptive", *(pytest.param(how, marks=pytest.mark.slow) for how in ("linear", "butterfly"))]
 )

@@ -12,6 +12,7 @@ from damageest.stages.background.minkowski import Minkowski
 from tests.stages.background.holding import box, dent, measure_gap
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["tube", *(pytest.param(name, marks=pytest.mark.slow) for name in ("grille", "gear"))])
 def test_everywhere_at_the_clearance(name: str) -> None:
     part = PARTS[name]()
@@ -40,5 +41,6 @@ def test_same_in_a_far_corner_of_space() -> None:
     assert there.volume == pytest.approx(here.volume, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_bounded_however_small_the_tolerance() -> None:
     assert len(Minkowski().run(box(), dent(9), 1e-3, 1e-3, True).faces) < 800_000

@@ -15,6 +15,7 @@ from damageest.stages.background.offset import Offset
 from tests.stages._open import bowl
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["cuboid", *(pytest.param(name, marks=pytest.mark.slow) for name in ("gear", "tube", "half_torus"))]
 )
@@ -34,11 +35,13 @@ def test_runs_beside_the_part_at_the_clearance(name: str) -> None:
     assert winding.min() > 0.5
 
 
+@pytest.mark.slow
 def test_bounded_however_small_the_tolerance() -> None:
     part = PARTS["cuboid"]()
     assert len(Offset().run(part, bowl(6, 10, 0.01), 1e-3, 1e-3, True).faces) < 500_000
 
 
+@pytest.mark.slow
 def test_a_surface_outside_is_refused() -> None:
     box = trimesh.creation.box((40, 30, 20))
     with pytest.raises(StageError, match="does not hold") as caught:

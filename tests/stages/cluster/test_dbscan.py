@@ -94,6 +94,7 @@ def test_sharpest_bend() -> None:
     assert find_sharpest_bend(np.array([1.0])) == np.inf
 
 
+@pytest.mark.slow
 def test_same_clusters_as_scikit_learn() -> None:
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(c, 0.5, (300, 3)) for c in (0, 4, 8)] + [rng.uniform(-5, 12, (200, 3))])
@@ -106,6 +107,7 @@ def test_same_clusters_as_scikit_learn() -> None:
     )
 
 
+@pytest.mark.slow
 def test_gathering_dense_points_keeps_the_clusters(monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(0)
     points = np.concatenate([rng.normal(c, 0.5, (3000, 3)) for c in (0, 9)])

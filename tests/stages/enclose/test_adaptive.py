@@ -33,6 +33,7 @@ def enclose(part: Part, surface: Surface, intact: np.ndarray, background: str = 
     return Adaptive().run(surface, rims, behind, part, intact, TOLERANCE)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("background", BACKGROUNDS)
 @pytest.mark.parametrize("turned", [False, True])
 def test_pit(part: Part, background: str, turned: bool) -> None:
@@ -44,6 +45,7 @@ def test_pit(part: Part, background: str, turned: bool) -> None:
     assert volume(mesh, part) == pytest.approx(2 / 3 * np.pi * 6**3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_rim_that_runs_over_the_boxs_edge(part: Part) -> None:
     """A ball out of the block's edge: images on two sides of the box, joined round its edge."""
     ball = trimesh.creation.icosphere(5, 6)
@@ -58,6 +60,7 @@ def test_a_rim_that_runs_over_the_boxs_edge(part: Part) -> None:
         assert volume(mesh, part) == pytest.approx(np.pi * 6**3 / 3, rel=0.015)
 
 
+@pytest.mark.slow
 def test_worn_through_needs_a_background_close_to_the_part(part: Part) -> None:
     surface = pipe(5, -10 + TOLERANCE, 10 - TOLERANCE)
     mesh = enclose(part, surface, sample_intact(part, 5))
@@ -65,6 +68,7 @@ def test_worn_through_needs_a_background_close_to_the_part(part: Part) -> None:
     assert volume(mesh, part) == pytest.approx(np.pi * 25 * 20, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_background_on_the_far_side_of_metal_is_refused() -> None:
     """A pit in the wall of a bore: the strip from there to the bounding box runs through the wall."""
     tube = trimesh.creation.annulus(10, 14, 40, sections=128)

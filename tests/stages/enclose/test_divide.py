@@ -7,15 +7,20 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from damageest.artefacts import Mesh, Part, Solid, Surface, open_edges
 from damageest.errors import StageError
+from damageest.geometry.distance import signed_distance
+from damageest.geometry.loops import trace_loops
 from damageest.geometry.solids import to_manifold
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.background.capsule import Capsule
 from damageest.stages.background.minkowski import Minkowski
 from damageest.stages.boundary.all_loops import AllLoops
 from damageest.stages.enclose import NotSeparatedError
+from damageest.stages.enclose._outside import extend_outside
 from damageest.stages.enclose.divide import Divide, Side
 from tests.stages._open import bowl, pipe
 from tests.stages.enclose.test_shortest_path import NO_POINTS, SIZE, TOLERANCE, sample_intact, volume
@@ -37,6 +42,7 @@ def enclose(
     return Divide(side=side).run(surface, rims, behind, part, intact, TOLERANCE)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("background", BACKGROUNDS)
 @pytest.mark.parametrize("turned", [False, True])
 def test_pit(part: Part, background: str, turned: bool) -> None:
@@ -48,6 +54,7 @@ def test_pit(part: Part, background: str, turned: bool) -> None:
     assert volume(mesh, part) == pytest.approx(2 / 3 * np.pi * 6**3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_rim_that_runs_over_the_boxs_edge(part: Part) -> None:
     """A ball out of the block's edge: images on two sides of the box, joined round its edge."""
     ball = trimesh.creation.icosphere(5, 6)
@@ -62,6 +69,29 @@ def test_a_rim_that_runs_over_the_boxs_edge(part: Part) -> None:
         assert volume(mesh, part) == pytest.approx(np.pi * 6**3 / 3, rel=0.015)
 
 
+@settings(max_examples=12)
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1))
+def test_where_the_border_lies_in_metal_it_is_known(y: float, z: float, x: float) -> None:
+    """It may dip into the part between two nodes where the skin turns; there the metal is opened, and nowhere else."""
+    corner = np.array([20 * x, 15 + y, 10 + z])
+    box = trimesh.creation.box(SIZE)
+    part = Part(box.vertices, box.faces)
+    ball = trimesh.creation.icosphere(4, 6)
+    ball.apply_translation(corner)
+    inside = (np.abs(ball.triangles) < SIZE / 2 - TOLERANCE).all(axis=(1, 2))
+    mesh = ball.submesh([np.flatnonzero(inside)], append=True)
+    surface = Surface(mesh.vertices, mesh.faces[:, ::-1])
+    sheet = extend_outside(surface, AllLoops().run(surface, part, TOLERANCE), part, 3 * TOLERANCE, TOLERANCE)
+    (border,) = trace_loops(sheet.mesh.faces)
+    at = sheet.mesh.vertices[border]
+    share = np.linspace(0, 1, 200, endpoint=False)[:, None, None]
+    fine = (at + share * (np.roll(at, -1, axis=0) - at)).reshape(-1, 3)
+    depth = -signed_distance(fine, part)[0]
+    for place, deep in zip(fine[depth > 0], depth[depth > 0], strict=True):
+        assert (np.linalg.norm(sheet.places - place, axis=1) + deep < 1.1 * sheet.deep).any()
+
+
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("background", BACKGROUNDS)
 def test_worn_through(part: Part, background: str) -> None:
     """Two rims on opposite faces, and between them nothing but the wall of the hole."""
@@ -71,6 +101,7 @@ def test_worn_through(part: Part, background: str) -> None:
     assert volume(mesh, part) == pytest.approx(np.pi * 25 * 20, rel=0.01)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("background", BACKGROUNDS)
 def test_a_pit_in_the_wall_of_a_bore(background: str) -> None:
     """The straight way from its rim to the background runs through metal."""
@@ -106,6 +137,7 @@ def test_a_surface_without_intact_points_is_refused(part: Part) -> None:
         enclose(part, bowl(6, 10, TOLERANCE), NO_POINTS)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("side", "share"), [("smaller", 0.0), ("larger", 1.0)])
 def test_a_job_can_say_the_side(part: Part, side: Any, share: float) -> None:
     """Also where no intact point shows it."""
@@ -115,6 +147,7 @@ def test_a_job_can_say_the_side(part: Part, side: Any, share: float) -> None:
     assert volume(mesh, part) == pytest.approx(expected, rel=0.01)
 
 
+@pytest.mark.slow
 def test_the_enclosure_reaches_the_background_and_leaves_it_nowhere(part: Part) -> None:
     surface = bowl(6, 10, TOLERANCE)
     mesh = enclose(part, surface, sample_intact(part, 6), "bbox")

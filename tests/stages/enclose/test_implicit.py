@@ -32,6 +32,7 @@ def intersect_pieces(case: Scene, enclosures: Enclosures) -> list[object]:
     return [body for body in bodies if body is not None]
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(
     ("name", "least"),
     [
@@ -58,6 +59,7 @@ def test_every_site_is_in_an_enclosure_and_none_in_two() -> None:
     assert (first ^ second).volume() == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_site_of_two_places_is_in_one_enclosure() -> None:
     """Stage cluster may link points over a wider gap than the enclosure does; it was in two, which is not valid."""
     case = scene("two")
@@ -67,6 +69,7 @@ def test_a_site_of_two_places_is_in_one_enclosure() -> None:
     assert iou(to_solid(unite(intersect_pieces(case, enclosures))), case.truth) > 0.9
 
 
+@pytest.mark.slow
 def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     case = scene("pit")
     away = np.linalg.norm(case.aligned.points - [26, 3, 12], axis=1) < 3
@@ -76,6 +79,7 @@ def test_skin_that_the_scanner_did_not_see_is_not_lost() -> None:
     assert iou(to_solid(unite(pieces)), case.truth) > 0.97
 
 
+@pytest.mark.slow
 def test_the_same_input_gives_the_same_bytes() -> None:
     first, again = enclose("pit").items[0], enclose_with(scene("pit")).items[0]
     assert first.solid.vertices.tobytes() == again.solid.vertices.tobytes()
@@ -91,6 +95,7 @@ def test_a_loss_too_large_for_its_grid_is_solved_coarsely_and_a_note_says_so() -
     assert iou(piece, case.truth) > 0.9
 
 
+@pytest.mark.slow
 def test_detail_spares_triangles_and_moves_the_surface_by_no_more() -> None:
     case = scene("pit")
     fine, coarse = (enclose_with(case, Implicit(detail=detail)).items[0].solid for detail in (0.0, 0.1))

@@ -45,6 +45,7 @@ def enclose(part: Part, surface: Surface, intact: np.ndarray, background: str = 
     return ShortestPath().run(surface, rims, behind, part, intact, TOLERANCE)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("background", "turned"), [("offset", False), ("offset", True), ("bbox", False)])
 def test_pit(part: Part, background: str, turned: bool) -> None:
     surface = bowl(6, 10, TOLERANCE)
@@ -55,6 +56,7 @@ def test_pit(part: Part, background: str, turned: bool) -> None:
     assert volume(mesh, part) == pytest.approx(2 / 3 * np.pi * 6**3, rel=0.01)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("loops", ["all", "largest"])
 def test_worn_through(part: Part, loops: str) -> None:
     surface = pipe(5, -10 + TOLERANCE, 10 - TOLERANCE)
@@ -68,6 +70,7 @@ def test_worn_through(part: Part, loops: str) -> None:
         assert volume(mesh, part) == pytest.approx(np.pi * 25 * (20 - TOLERANCE), rel=0.01)
 
 
+@pytest.mark.slow
 def test_more_than_half_lost(part: Part) -> None:
     """The larger side is the damage where the intact points are on the smaller."""
     x = np.linspace(-0.5, 0.5, 60)
@@ -88,6 +91,7 @@ def test_a_surface_without_intact_points_is_refused(part: Part) -> None:
         enclose(part, bowl(6, 10, TOLERANCE), NO_POINTS)
 
 
+@pytest.mark.slow
 def test_intact_points_on_both_sides_are_refused(part: Part) -> None:
     rng = np.random.default_rng(0)
     angle, radius = rng.uniform(0, 2 * np.pi, 4000), 6 * np.sqrt(rng.random(4000))
@@ -116,6 +120,7 @@ def test_rim_smaller_than_the_edges_of_the_background_is_refused(part: Part) -> 
         )
 
 
+@pytest.mark.slow
 def test_rims_come_from_the_boundary_stage(part: Part) -> None:
     """A loop that boundary left out is closed flat, so that no edge is open."""
     surface = pipe(5, -8, 8)

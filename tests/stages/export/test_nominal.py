@@ -129,6 +129,7 @@ def test_result_json_says_the_amount_and_which_frame_each_file_is_in(bent: tuple
     assert {f"nominal_frame/{name}" for name in ("undamaged.ply", "scan.ply")} <= set(said["export"]["files"])
 
 
+@pytest.mark.slow
 def test_damage_is_moved_back_by_the_inverse_of_the_field(drawn: tuple[Result, Result], tmp_path: Path) -> None:
     plain, there = drawn
     write(there, tmp_path, format=["ply"], frame="nominal")
@@ -139,6 +140,7 @@ def test_damage_is_moved_back_by_the_inverse_of_the_field(drawn: tuple[Result, R
         assert back.volume == pytest.approx(site.damage.volume, rel=0.01)
 
 
+@pytest.mark.slow
 def test_nominal_alone_writes_no_other_frame(drawn: tuple[Result, Result], tmp_path: Path) -> None:
     written = write(drawn[1], tmp_path, format=["stl", "3mf"], frame="nominal")
     assert {name.split("/")[0] for name in written.files} == {"nominal_frame", "truth"}
@@ -162,6 +164,7 @@ def test_without_a_field_the_message_says_what_to_do(drawn: tuple[Result, Result
     assert "frame: part" in told.value.remedy
 
 
+@pytest.mark.slow
 def test_a_field_that_folds_is_refused(drawn: tuple[Result, Result], tmp_path: Path) -> None:
     adapted = drawn[1].adapted
     assert adapted is not None

@@ -20,6 +20,7 @@ pytestmark = needs_plugin("cadquery")
 cq = import_for("cadquery", "cadquery")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("detail", "units"),
     [
@@ -53,6 +54,7 @@ def test_volumes_and_unit(units: str, detail: float | None, tmp_path: Path, regi
     assert (box.xmax, box.ymax, box.zmax) == pytest.approx(high, abs=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("units", ["in", pytest.param("mm", marks=pytest.mark.slow)])
 def test_inner_damage_surfaces_as_splines(units: str, tmp_path: Path, registry: Registry) -> None:
     scale = MILLIMETRES[units]

@@ -54,12 +54,14 @@ def test_where_nothing_changed_nothing_is_found(tmp_path: Path) -> None:
     assert result.volume_95[0] == 0
 
 
+@pytest.mark.slow
 def test_a_later_scan_in_another_unit_is_refused(tmp_path: Path) -> None:
     drawn = draw_pair(Pair("", "block", CHIP, scale=1 / 25.4, **FEW), 1)
     with pytest.raises(InputError, match="in inches"):
         compare(tmp_path, drawn)
 
 
+@pytest.mark.slow
 def test_an_open_scan_has_to_tell_which_side_is_metal(tmp_path: Path) -> None:
     drawn = draw_pair(Pair("", "block", **FEW), 1)
     with pytest.raises(InputError, match="does not tell which side of its surface is metal"):
@@ -70,6 +72,7 @@ def test_an_open_scan_has_to_tell_which_side_is_metal(tmp_path: Path) -> None:
         compare(tmp_path, drawn, turned)
 
 
+@pytest.mark.slow
 def test_an_open_mesh_is_skin_where_it_has_triangles(tmp_path: Path) -> None:
     ball = trimesh.creation.icosphere(5, 10.0)
     seen = ball.triangles_center[:, 2] > -5
@@ -87,3 +90,14 @@ def test_too_few_points_are_refused(tmp_path: Path) -> None:
     drawn = draw_pair(Pair("", "block", **FEW), 1)
     with pytest.raises(DamageestError, match="too few"):
         compare(tmp_path, drawn, drawn.before[:500])
+
+
+@pytest.mark.parametrize("side", [1.0, -1.0])
+def test_a_given_scanner_position_tells_where_the_metal_is(side: float, tmp_path: Path) -> None:
+    x, y = np.random.default_rng(4).uniform(-20, 20, (2, 2500))
+    np.save(tmp_path / "plate.npy", np.column_stack([x, y, 0.01 * x * y]))  # a saddle: no side of it is round
+    found = EarlierScan(path=tmp_path / "plate.npy", viewpoint=(0.0, 0.0, 300 * side), cell=1.5).run(unit="mm")
+    x, y, z = found.vertices.mean(axis=0)
+    assert side * z < 0  # the metal is beyond the skin
+    with pytest.raises(ValueError, match="viewpoint"):
+        EarlierScan(path=(tmp_path / "plate.npy",), viewpoint=(0.0, 0.0, 300.0))

@@ -41,6 +41,7 @@ def test_the_box_comes_back_closed_with_a_note_of_its_errors(part: Part) -> None
     assert "rounded" in part.notes[-1]
 
 
+@pytest.mark.slow
 def test_same_scan_same_bytes(part: Part, whole: Path) -> None:
     again = PartFromScan(path=whole).run("mm")
     assert again.vertices.tobytes() == part.vertices.tobytes()
@@ -59,17 +60,20 @@ def open_top(whole: Path, path: Path, radius: float) -> Path:
     return path
 
 
+@pytest.mark.slow
 def test_a_small_opening_is_closed_and_noted(tmp_path: Path, whole: Path) -> None:
     part = PartFromScan(path=open_top(whole, tmp_path / "open.npy", 1.8)).run("mm")
     assert iou([part], [box()]) > 0.98
     assert "closes openings" in part.notes[-1]
 
 
+@pytest.mark.slow
 def test_a_larger_one_is_refused(tmp_path: Path, whole: Path) -> None:
     with pytest.raises(InputError, match="opening"):
         PartFromScan(path=open_top(whole, tmp_path / "open.npy", 4.0)).run("mm")
 
 
+@pytest.mark.slow
 def test_uneven_density_is_no_opening(tmp_path: Path) -> None:
     part = PartFromScan(path=specimen(tmp_path, 30_000, density=0.7)).run("mm")
     assert iou([part], [box()]) > 0.98
@@ -91,6 +95,7 @@ def test_too_few_points_and_too_fine_a_cell_are_refused(tmp_path: Path) -> None:
         PartFromScan(path=specimen(tmp_path), cell=0.02).run("mm")
 
 
+@pytest.mark.slow
 def test_a_job_without_cad_finds_the_damage(tmp_path: Path) -> None:
     specimen(tmp_path, 8000)
     np.save(tmp_path / "scan.npy", scan(6000))

@@ -55,6 +55,7 @@ def test_normals_toward_the_lost_material(surface: Surface) -> None:
     assert (np.einsum("ij,ij->i", surface.cross, inward) > 0).mean() > 0.99
 
 
+@pytest.mark.slow
 def test_same_points_same_bytes(surface: Surface) -> None:
     points, part = scene()
     again = PyVista().run(points, part, TOLERANCE, 0.15, NOISE)

@@ -24,6 +24,13 @@ def test_averages_the_noise(surface: Surface) -> None:
     assert np.abs(measure_errors(surface)).max() < TOLERANCE
 
 
+def test_a_hollow_of_few_points_is_as_deep_as_it_is() -> None:
+    points, part = scene()
+    sparse = SignedDistance().run(points[::12], part, TOLERANCE, 0.55, NOISE)
+    inner = np.abs(sparse.vertices[:, 2] - TOP) > 1
+    assert np.median(measure_errors(sparse)[inner]) == pytest.approx(0, abs=0.003 * RADIUS)
+
+
 def test_one_piece_with_one_rim_and_normals_toward_the_lost_material(surface: Surface) -> None:
     from damageest.stages.boundary.all_loops import AllLoops
 
@@ -60,6 +67,7 @@ CUT = {"tool": "box", "centre": [20, 15, 10], "size": [14, 12, 10], "rotation": 
 BLOB = {"tool": "blob", "centre": [18, 0, 10], "radius": 7, "seed": 2}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("tool", "density", "points"),
     [

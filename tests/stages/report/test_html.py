@@ -63,6 +63,7 @@ def test_it_needs_no_other_file(page: Page, text: str) -> None:
     assert "url(" not in style
 
 
+@pytest.mark.slow
 def test_the_path_is_shown_layer_by_layer_with_its_tool_and_what_it_does_not_reach() -> None:
     path, plain = plan(dent(), simulate=False, direction=(0.0, 0.0, 1.0)), pages.two_sites()
     result = replace(plain, sites=(replace(plain.sites[0], path=path), plain.sites[1]))
@@ -102,11 +103,13 @@ def test_ids_are_given_once(page: Page) -> None:
     assert len(ids) == len(set(ids))
 
 
+@pytest.mark.slow
 def test_same_bytes_twice_but_for_dates(text: str) -> None:
     assert DATES.sub("", text) == DATES.sub("", pages.write(pages.two_sites()).read_text())
     assert len(DATES.findall(text)) == 1
 
 
+@pytest.mark.slow
 def test_markup_in_names_and_messages_does_no_harm(tmp_path: Path, page: Page) -> None:
     nasty, result = pages.NASTY, pages.two_sites()
     sites = tuple(
@@ -134,6 +137,7 @@ def test_runs_without_sites(kind: str) -> None:
     assert ("it failed" in text) == (kind == "incomplete")
 
 
+@pytest.mark.slow
 def test_many_points_and_triangles_stay_small() -> None:
     result, limit = pages.two_sites(), Html(points=2000, triangles=2000)
     small, usual = pages.write(result, stage=limit), pages.write(result)
@@ -143,6 +147,7 @@ def test_many_points_and_triangles_stay_small() -> None:
     assert 1000 < int(shown[1]) <= 2000
 
 
+@pytest.mark.slow
 def test_the_run_writes_it_and_names_it(small_done: Path) -> None:
     out = small_done.parent / "out/job"
     result = damageest.run(small_done, output=True, settings=["report=html"])
@@ -153,6 +158,7 @@ def test_the_run_writes_it_and_names_it(small_done: Path) -> None:
     assert not (out / "report.html").exists()
 
 
+@pytest.mark.slow
 def test_a_report_that_fails_is_a_warning(small_done: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object) -> None:
         raise ValueError("no such colour")

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import damageest
-from damageest.artefacts import Mesh
+from damageest.artefacts import Mesh, Reason
 from damageest.findings import Coverage, Surplus, UnseenRegion
 from tests.stages.report import browser, pages
 
@@ -75,6 +75,7 @@ def test_no_other_script_runs_and_nothing_is_fetched(chromium: Any) -> None:
     shown.page.close()
 
 
+@pytest.mark.slow
 def test_each_layer_draws_and_switches(shown: browser.Shown) -> None:
     for box in shown.page.locator("input.layer").all():
         box.uncheck()
@@ -225,7 +226,7 @@ def test_the_form_is_exaggerated_by_a_slider(chromium: Any) -> None:
 def test_without_sites_and_with_markup_in_every_name(chromium: Any) -> None:
     nasty, result = pages.NASTY, pages.two_sites()
     none = replace(result, sites=(), damage=None, undamaged=result.part, site_label=np.zeros_like(result.site_label))
-    told = replace(none, name=nasty, warnings=(nasty,), failures=(nasty,))
+    told = replace(none, name=nasty, warnings=(Reason("align", nasty),), failures=(nasty,))
     report = browser.Shown(chromium, pages.write(told, job_text=nasty))
     assert report.page.title() == f"{nasty} – damage report"
     assert not report.faults
@@ -269,6 +270,7 @@ def test_twelve_sites(chromium: Any, tmp_path: Path) -> None:
     check_drawn(report)
 
 
+@pytest.mark.variants(slow=3)
 @pytest.mark.slow
 @pytest.mark.parametrize("job", sorted((Path(__file__).parents[3] / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_report_of_each_job(job: Path, chromium: Any, tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ def run(job: Path, language: str) -> list[str]:
     return [page.get_textpage().get_text_range() for page in document]
 
 
+@pytest.mark.slow
 def test_the_pdf_has_a_summary_sections_and_a_page_for_each_site(small_done: Path) -> None:
     summary, sections, site, budget = run(small_done, "en")
     for text in (

@@ -104,6 +104,7 @@ def test_the_same_of_a_scan_that_is_read_in_pieces(tmp_path: Path, monkeypatch: 
     assert scan.warnings[0].amount == (CONFIDENCE < 0.25).sum()
 
 
+@pytest.mark.slow
 def test_colours_and_confidence_are_in_the_scan_that_is_written(tmp_path: Path) -> None:
     """Of each point, after a crop and the merge of two files with points in common."""
     points = damaged_box.scan(6000).astype(np.float32)
@@ -135,7 +136,8 @@ def test_colours_and_confidence_are_in_the_scan_that_is_written(tmp_path: Path) 
 
 
 def read_table(path: Path) -> Any:
-    from damageest.io.points.ply import make_dtype, read_header
+    from damageest.io.points.ply import make_dtype
+    from damageest.io.points.ply_header import read_header
 
     header = read_header(path)
     return np.frombuffer(path.read_bytes(), make_dtype(header.vertex, "<"), offset=header.end)

@@ -40,6 +40,7 @@ def write(path: Path, points: Floats, view: Any, places: Floats) -> None:
     write_e57(path, *scans)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("most_points", [0, pytest.param(6000, marks=pytest.mark.slow)])
 def test_each_scan_has_its_pose_and_position(tmp_path: Path, most_points: int) -> None:
     """Read whole and in pieces."""

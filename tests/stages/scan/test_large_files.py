@@ -98,6 +98,7 @@ def write_job(folder: Path, most_points: int, **more: object) -> Path:
     return folder / "job.yaml"
 
 
+@pytest.mark.slow
 def test_a_thinned_scan_has_all_points_of_the_damage(tmp_path: Path) -> None:
     whole = damageest.run(write_job(tmp_path / "whole", 0))
     few = damageest.run(write_job(tmp_path / "few", POINTS // 4), output=tmp_path / "out")
@@ -121,6 +122,7 @@ def test_crops_hold_for_the_points_added(tmp_path: Path) -> None:
     assert few.scan.points[:, 0].max() <= 0
 
 
+@pytest.mark.slow
 def test_a_file_is_read_whole_for_a_crop_that_needs_all_points(tmp_path: Path) -> None:
     count = ScanFile.model_fields["most_points"].default + 1000
     np.save(tmp_path / "scan.npy", np.random.default_rng(0).random((count, 3), dtype=np.float32))

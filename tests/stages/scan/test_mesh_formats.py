@@ -108,6 +108,7 @@ def test_nodes_of_a_scene_are_applied(tmp_path: Path, suffix: str) -> None:
     assert scan.points[order[0]] == pytest.approx(expected[order[1]], abs=1e-5)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "suffix", ["ply", "glb", *(pytest.param(suffix, marks=pytest.mark.slow) for suffix in ("stl", "obj", "vtp", "vtk"))]
 )

@@ -67,6 +67,7 @@ def test_the_true_volume_is_the_tools_within_the_part(
     assert outside.volume() <= 1e-9 * cuboid.volume
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", ["gear", "blade", "grille", "tube"])
 def test_points_lie_on_the_damaged_surface(name: str) -> None:
     part = PARTS[name]()

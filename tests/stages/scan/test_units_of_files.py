@@ -121,6 +121,7 @@ def test_lines_that_name_a_unit(line: str, unit: str | None) -> None:
     assert find_unit([line])[0] == unit
 
 
+@pytest.mark.slow
 def test_a_run_tells_of_the_unit_that_it_took(tmp_path: Path) -> None:
     """The box in inches, its job in millimetres: the volume is right, and the unit is among the warnings."""
     damaged_box.write_small(tmp_path)

@@ -59,6 +59,7 @@ def test_plain_is_the_distance_to_the_points_and_needs_them_dense() -> None:
     assert (np.abs(got) <= exact + samples.spacing).all()
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", ["block", "blade", "gear"])
 def test_labels_agree_with_the_exact_ones(name: str) -> None:
     part = PARTS[name]()

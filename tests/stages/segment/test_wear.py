@@ -131,6 +131,7 @@ def wear_of(name: str, depth: float, folder: Path) -> dict[str, object]:
     return {"tool": "mesh", "path": str(folder / "ring.stl")}
 
 
+@pytest.mark.variants(slow=1)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) for name in ("cuboid", "shaft", "tube")])
 def test_volume_of_wear_of_three_sigma(name: str, tmp_path: Path) -> None:
     """A tenth of the surface worn by three quarters of the tolerance: most points are within it. In unknown pose."""
@@ -149,6 +150,7 @@ def test_volume_of_wear_of_three_sigma(name: str, tmp_path: Path) -> None:
     assert result.truth[1] > 0.8
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "name", ["cuboid", *(pytest.param(name, marks=pytest.mark.slow) for name in ("coupling", "blade"))]
 )

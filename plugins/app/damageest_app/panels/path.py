@@ -31,7 +31,7 @@ class PathTool(Panel):
         self.plays: dict[int, PathPlay] = {}
         self.state.update(
             {"has_path": False, "path": {}, "path_share": 1.0, "path_layer": 0, "path_layers": 0, "path_words": "",
-             "path_sites": [], "path_site": 0}
+             "path_sites": [], "path_site": 0, "path_faults": [], "path_left": ""}
         )  # fmt: skip
         self.state.change("path_share", "path_site")(lambda **_: self._play())
         self.state.change("path_layer")(lambda **_: self._go_to_layer())
@@ -77,6 +77,13 @@ class PathTool(Panel):
                 raw_attrs=mark("layer"),
             )  # fmt: skip
             html.Div("{{ path_words }}", classes="fine", raw_attrs=mark("path-words"))
+            html.Div(
+                "{{ one.text }}",
+                v_for=("(one, k) in path_faults",),
+                key=("k",),
+                classes=("one.is_much ? 'fine text-error font-weight-bold' : 'fine'",),
+                raw_attrs=mark("path-fault"),
+            )
 
     async def add_path(self) -> None:
         """Values that fit the tolerance and the depth of the damage; a person changes them."""
@@ -118,6 +125,9 @@ class PathTool(Panel):
         play = self.plays.get(self.state.path_site)
         self.state.path_layers = int(play.layer.max()) if play is not None else 0
         self.state.path_share = 1.0
+        self.state.path_faults = results.list_path_faults() if results else []
+        much = [one["text"] for one in self.state.path_faults if one["is_much"]]
+        self.state.path_left = "Do not take the paths to a machine as they are: " + "; ".join(much) if much else ""
 
     def _go_to_layer(self) -> None:
         """The slider of layers was moved; where the one of the time moved it, both agree already."""

@@ -117,14 +117,19 @@ class RepairPanel(Panel):
         )
         html.Div("Formats are written by the next run.", classes="fine mt-1 mb-3")
         with html.Div(v_if=("has_result",)):
+            html.Div(
+                "{{ path_left }}",
+                v_if=("path_left",),
+                classes="text-error font-weight-bold mb-2",
+                raw_attrs=mark("path-left"),
+            )
             v3.VBtn(
                 "download one zip",
                 prepend_icon="mdi-download",
                 color="primary",
                 variant="tonal",
                 href="/download",
-                download=True,
-                raw_attrs=mark("download"),
+                raw_attrs=mark("download", "download"),  # without this attribute the app itself goes to the file
             )
             v3.VBtn(
                 "open the folder",

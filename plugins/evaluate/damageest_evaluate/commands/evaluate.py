@@ -10,7 +10,19 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from damageest_evaluate.commands import adapt, budget, difference, honesty, path, prepare, realistic, speed, steady
+from damageest_evaluate.commands import (
+    adapt,
+    budget,
+    difference,
+    honesty,
+    path,
+    prepare,
+    real,
+    realistic,
+    speed,
+    steady,
+    worn,
+)
 from damageest_evaluate.commands._counted import AsJson, format_command, prepare_places, show_table
 from damageest_evaluate.commands.intervals import run_intervals
 
@@ -23,9 +35,11 @@ app.command("adapt")(adapt.command)
 app.command("budget")(budget.command)
 app.command("difference")(difference.command)
 app.command("honesty")(honesty.command)
+app.command("real")(real.command)
 app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)
 app.command("speed")(speed.command)
+app.command("worn")(worn.command)
 app.command("path")(path.command)
 app.command("prepare")(prepare.command)
 

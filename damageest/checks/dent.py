@@ -1,0 +1,86 @@
+"""Whether a loss may be a dent: metal that moved, of a wall of which one side was seen.
+
+A dent in sheet metal and a shallow pit look alike from outside. What tells them apart is the other side of the wall, or
+an edge: metal that is cut, chipped or pitted ends at one, metal that is bent fades out on both sides of any depth.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import ADDED, Deviation, Floats, Ints, Part, Scan, Solid
+from damageest.checks.coverage import SkinView, find_removed_cells
+from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
+from damageest.geometry.rays import measure_thickness
+
+BENDABLE = 0.5
+"""Thickness of a wall, in widths of the loss, up to which it may have been bent there."""
+SEEN = 0.3
+"""Share of the wall's other side that the scan shows from which that side tells what happened."""
+SHALLOW, DEEP = 0.1, 1.9
+"""Depths in those of the rim, where the loss was found to end: of a loss that ends at an edge, its flank takes the same
+width from one to the rim, and from there to the other."""
+FADES, FADES_SPACINGS = 1.5, 1.0
+"""How many times wider, and by how many point spacings more, the way outward is where a loss has no edge."""
+FEWEST = 8
+"""Points of a ring around the rim, at least, for their mean depth to count."""
+WIDEST = 3.0
+"""How far out rings are looked at, in widths of the loss."""
+
+
+def find_bent_wall(damage: Solid, part: Part, skin: SkinView, scan: Scan, deviation: Deviation, members: Ints) -> float:
+    """The thickness of the wall that may be dented where a loss was found; 0 where it is none, or not so.
+
+    ``members`` (M,): the scan points of the loss. The wall's other side is near and was not seen, and no edge ends the
+    loss.
+    """
+    own = find_removed_cells(damage, skin)
+    if not own.any() or not len(members):
+        return 0.0
+    cells = skin.cells
+    width = float(np.sqrt(cells.areas[own].sum()))
+    thickness, other = _look_through(part, cells.centres[own], cells.normals[own])
+    through = np.isfinite(thickness)
+    if through.mean() < 0.5 or np.median(thickness[through]) > BENDABLE * width:
+        return 0.0
+    nearest = find_neighbours(other[through], 1, cells.centres)[1][:, 0]
+    if skin.perhaps_seen[nearest].mean() > SEEN or _has_edge(scan, deviation, members, width):
+        return 0.0
+    return float(np.median(thickness[through]))
+
+
+def _look_through(part: Part, places: Floats, normals: Floats) -> tuple[Floats, Floats]:
+    """The thickness (N,) of the part below places on its skin (N,3), and the place on the other side (N,3)."""
+    thickness = measure_thickness(part, places, normals)
+    return thickness, places - np.where(np.isfinite(thickness), thickness, 0.0)[:, None] * normals
+
+
+def _has_edge(scan: Scan, deviation: Deviation, members: Ints, width: float) -> bool:
+    """Whether a loss ends as abruptly outward as it does inward; so it does where too few points tell."""
+    is_own = np.zeros(len(scan.points), bool)
+    is_own[members] = True
+    near = find_nearby(scan.points, scan.points[members], WIDEST * width)
+    outer = near[~is_own[near] & (deviation.label[near] != ADDED)]
+    if len(outer) < FEWEST or len(members) < FEWEST:
+        return True
+    ring = max(0.5 * scan.spacing, 1e-9)
+    outward = find_neighbours(scan.points[outer], 1, scan.points[members])[0][:, 0]
+    inward = find_neighbours(scan.points[members], 1, scan.points[outer])[0][:, 0]
+    beside, within = -deviation.distance[outer], -deviation.distance[members]
+    rim = float((np.mean(beside[outward < 2 * ring]) + np.mean(within[inward < 2 * ring])) / 2)
+    out = _find_level(outward, beside, ring, SHALLOW * rim, falls=True)
+    into = _find_level(inward, within, ring, DEEP * rim, falls=False)
+    return out <= FADES * into + FADES_SPACINGS * scan.spacing
+
+
+def _find_level(away: Floats, depth: Floats, ring: float, level: float, falls: bool) -> float:
+    """How far from the rim the mean depth of rings first falls below a level, or rises above it: the farthest ring
+    where it does neither, and 0 where no ring has enough points."""
+    number = (away / ring).astype(np.int64)
+    count = np.bincount(number)
+    kept = np.flatnonzero(count >= FEWEST)
+    if not len(kept):
+        return 0.0
+    mean = np.bincount(number, weights=depth)[kept] / count[kept]
+    there = kept[mean < level] if falls else kept[mean > level]
+    return float(ring * (there[0] if len(there) else kept[-1]))

@@ -1,0 +1,81 @@
+"""The step for pores: closed inner surfaces that do not reach the skin, as tomography shows them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from damageest.artefacts import Ints, Solid, Surface, open_edges
+from damageest.checks.evidence import weigh_evidence
+from damageest.errors import StageError
+from damageest.geometry.distance import signed_distance
+from damageest.pipeline.engine import Engine
+from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState
+from damageest.pipeline.steps import step
+from damageest.stages.boundary import Boundary
+from damageest.stages.reconstruct import Reconstruct
+
+PORE = "pore"
+"""The method of a site that is a pore."""
+DEEP = 2.0
+"""Depth in tolerances, and in point spacings, below which all of a pore lies."""
+
+
+@step(
+    gives=("found", "failures"),
+    reads=("found", "failures", "sites", "aligned", "deviation", "part", "tolerance", "unit"),
+    calls=(Reconstruct,),
+)
+def add_pores(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures]:
+    """Makes a site of each cluster without a rim whose inner surface is closed and lies well inside the metal.
+
+    It counts as lost metal. It is never deposited: nothing could reach it.
+    """
+    found, kept = list(state.found), []
+    for error in state.failures:
+        pore = _make_pore(engine, state, error.site) if error.stage == Boundary.stage and error.site else None
+        if pore is None:
+            kept.append(error)
+        else:
+            found.append(pore)
+    return tuple(found), tuple(kept)
+
+
+def _make_pore(engine: Engine, state: JobState, number: int) -> FoundSite | None:
+    """The site of a cluster that is a pore; None where its points lie near the skin, or bound no volume."""
+    members = state.sites.members(number)
+    points = state.aligned.points[members]
+    least = DEEP * max(state.tolerance, state.aligned.spacing)
+    if -float(state.deviation.distance[members].max()) < least:
+        return None
+    candidate = Candidate(number=number, clusters=(number,), method=PORE)
+    candidate = candidate.with_value(Candidate.points, points).with_value(Candidate.fine, True)
+    try:
+        surface = engine.call(Reconstruct, replace(candidate, job=state)).surface
+    except StageError:
+        return None
+    solid = _close(surface)
+    if solid is None:
+        return None
+    below = -float(signed_distance(solid.vertices, state.part)[0].max())
+    evidence = weigh_evidence(solid, points, state.aligned, state.deviation, state.part, state.tolerance)
+    note = (
+        f"a pore inside the metal: its inner surface is closed, and lies {below:.3g} {state.unit} below the skin at "
+        "least; it counts as lost, and is in no deposit and no path"
+    )
+    site = FoundSite(clusters=(number,), method=PORE, members=members, evidence=evidence, notes=(note,))
+    return site.with_value(FoundSite.damage, solid)
+
+
+def _close(surface: Surface) -> Solid | None:
+    """The volume within a closed surface, whichever way it faces; None where it is open."""
+    faces: Ints = surface.faces
+    if not len(faces) or open_edges(faces):
+        return None
+    for turned in (faces, faces[:, ::-1]):
+        try:
+            return Solid(surface.vertices, np.ascontiguousarray(turned))
+        except ValueError:
+            continue
+    return None

@@ -1,0 +1,178 @@
+"""What a caller in Python sees of a run while it goes on, and how it ends one: progress, cancel, what was computed."""
+
+from __future__ import annotations
+
+import ctypes
+import threading
+import time
+from collections import OrderedDict
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+from damageest.errors import CancelledError, DamageestError
+from damageest.pipeline.engine import Branch, Engine, Route
+from damageest.pipeline.state import JobState
+from damageest.pipeline.steps import Step
+from damageest.registry.hookspecs import hookimpl
+from damageest.result import SoFar
+
+POLL = 0.05
+"""Seconds between two looks at whether the caller has cancelled."""
+AGAIN = 0.5
+"""Seconds after which a run that goes on is interrupted again: code of a library may have swallowed it."""
+
+
+class Signal(Protocol):
+    """What cancels a run, as a `threading.Event`."""
+
+    def is_set(self) -> bool: ...
+
+
+@dataclass(frozen=True)
+class Progress:
+    """``stage``: what is at work, as "align", with its implementation ``use``, or a step between the stages, without
+    one. ``site``: its number, 0 for the whole scan. ``part``: of its work, in words, empty where it tells none.
+    ``share``: of the run's stages and steps that are done, 0 to 1; it never falls. ``seconds`` since the run began."""
+
+    stage: str
+    use: str
+    site: int
+    part: str
+    share: float
+    seconds: float
+
+
+class Teller:
+    """An observer that tells a caller what the stages and steps of one run do."""
+
+    def __init__(self, to: Callable[[Progress], object], route: Route) -> None:
+        self._to, self._names = to, set(list_names(route))
+        self._done: set[str] = set()
+        self._began, self._thread = time.monotonic(), threading.get_ident()
+
+    def _tell(self, stage: str, use: str = "", site: int = 0, part: str = "", share: float | None = None) -> None:
+        if threading.get_ident() != self._thread:
+            return  # a registry may be used by runs in several threads
+        found = len(self._done & self._names) / max(len(self._names), 1)
+        seconds = time.monotonic() - self._began
+        self._to(Progress(stage, use, site, part, min(found, 0.99) if share is None else share, seconds))
+
+    @hookimpl
+    def damageest_before_stage(self, stage: str, use: str, site: int) -> None:
+        self._tell(stage, use, site)
+
+    @hookimpl
+    def damageest_part_begins(self, stage: str, use: str, site: int, what: str) -> None:
+        self._tell(stage, use, site, what)
+
+    @hookimpl
+    def damageest_after_stage(self, stage: str, use: str, site: int) -> None:
+        self._done.add(stage)
+
+    @hookimpl
+    def damageest_after_step(self, step: str) -> None:
+        self._done.add(step)
+        self._tell(step)
+
+    def finish(self) -> None:
+        self._tell("done", share=1.0)
+
+
+def list_names(route: Route) -> Iterator[str]:
+    """The names by which observers hear of the stages and steps of a route; of a fork, those of its first way."""
+    for item in route:
+        if isinstance(item, Branch):
+            yield from list_names(item.routes[0] if item.routes else ())
+        elif isinstance(item, Step):
+            yield item.name.replace("_", " ").strip()
+        else:
+            yield item.stage
+
+
+class _Stop(KeyboardInterrupt):
+    """What is raised in the thread of a run that is cancelled: all code of damageest treats it as Ctrl-C."""
+
+
+@contextmanager
+def cancel_with(signal: Signal | None) -> Iterator[None]:
+    """Ends what runs in the ``with`` block, in this thread, soon after ``signal`` is set: as Ctrl-C would, so that its
+    processes end and its scratch files go. Raises CancelledError then."""
+    if signal is None:
+        yield
+        return
+    thread, over = threading.get_ident(), threading.Event()
+    guard = threading.Lock()
+
+    def watch() -> None:
+        while not over.wait(POLL):
+            if signal.is_set():
+                with guard:
+                    if not over.is_set():
+                        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_Stop))
+                over.wait(AGAIN)
+
+    watcher = threading.Thread(target=watch, name="damageest cancel", daemon=True)
+    if signal.is_set():
+        raise CancelledError
+    watcher.start()
+    try:
+        yield
+    except KeyboardInterrupt as error:
+        if not signal.is_set():
+            raise
+        raise CancelledError from error
+    finally:
+        with guard:
+            over.set()
+            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), None)
+        watcher.join()
+
+
+@contextmanager
+def keep_so_far(engine: Engine) -> Iterator[None]:
+    """Gives an error that ends a run what the run had computed before it, as ``so_far``."""
+    try:
+        yield
+    except DamageestError as error:
+        error.so_far = gather_so_far(engine)
+        raise
+
+
+def gather_so_far(engine: Engine) -> SoFar:
+    """The values of the run's last state, and its records of stages."""
+    last: JobState = engine.last or JobState()
+    values = {name: last.get(name) for name in SoFar.__dataclass_fields__ if name in last.values}
+    return SoFar(**{**values, "stages": tuple(engine.records)})
+
+
+@dataclass
+class MemoryCache:
+    """What stages gave, in memory, for callers who run jobs on the same part many times: give the same one as ``cache``
+    to each run. It keeps the last ``most`` values; a key is made of code, options and inputs, so that none is ever out
+    of date. Runs of several threads may share it."""
+
+    most: int = 200
+    _kept: OrderedDict[tuple[str, str], Any] = field(default_factory=OrderedDict, repr=False)
+    _lock: threading.Lock = field(default_factory=threading.Lock, repr=False)
+
+    def get(self, name: str, key: str) -> tuple[bool, Any]:
+        """(found, value)."""
+        with self._lock:
+            if (name, key) not in self._kept:
+                return False, None
+            self._kept.move_to_end((name, key))
+            return True, self._kept[name, key]
+
+    def put(self, name: str, key: str, value: Any) -> None:
+        """Keeps a value."""
+        with self._lock:
+            self._kept[name, key] = value
+            while len(self._kept) > self.most:
+                self._kept.popitem(last=False)
+
+    def clear(self) -> None:
+        """Forgets all."""
+        with self._lock:
+            self._kept.clear()

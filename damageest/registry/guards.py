@@ -1,0 +1,94 @@
+"""Calls of functions that plugins bring beside their stages: where one fails, the error says whose it is."""
+
+from __future__ import annotations
+
+import errno
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from damageest.errors import DamageestError, StageError, clean_message, describe_shortage, is_interrupt
+from damageest.isolation import at_work
+from damageest.stages.export import ExportedFiles, PathWriter, Writer
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EROFS)
+"""Errors of the system for which no writer is to blame."""
+
+
+def guard_writer(name: str, writer: Writer, owner: str) -> Writer:
+    """The writer of a format with each of its functions guarded. ``owner``: whose it is, with its version."""
+    guard = partial(_guard, name, owner, "damageest_writers")
+    return replace(
+        writer,
+        write=guard("write", writer.write, _check_files),
+        exact=guard("exact", writer.exact, _check_files),
+        document=guard("document", writer.document, _check_files),
+        patch=guard("patch", writer.patch, _check_note),
+    )
+
+
+def guard_path_writer(name: str, writer: PathWriter, owner: str) -> PathWriter:
+    """The same for a format of paths."""
+    guard = partial(_guard, name, owner, "damageest_path_writers")
+    return replace(
+        writer,
+        write=guard("write", writer.write, _check_path_notes),
+        check=guard("check", writer.check, lambda given, folder: ""),
+    )
+
+
+def _guard(name: str, owner: str, hook: str, what: str, function: Any, check: Callable[[Any, Path], str]) -> Any:
+    if function is None:
+        return None
+    called = f"'{name}' of {owner} ({_name_function(function)}, its `{what}`, from the hook {hook})"
+    return partial(_call, function, check, called, owner)
+
+
+def _name_function(function: Any) -> str:
+    inner = getattr(function, "func", function)
+    title = getattr(inner, "__qualname__", type(inner).__qualname__)
+    return f"{getattr(inner, '__module__', type(inner).__module__)}.{title}"
+
+
+def _call(function: Any, check: Callable[[Any, Path], str], called: str, owner: str, *values: Any, **named: Any) -> Any:
+    remedy = f"another format; report it to the authors of {owner}"
+    try:
+        with at_work(f"the writer {called}", owner=owner):
+            given = function(*values, **named)
+    except DamageestError:
+        raise
+    except BaseException as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        if describe_shortage(error) or (isinstance(error, OSError) and error.errno in FULL):
+            raise
+        text = f"the writer {called} failed: {type(error).__name__}: {clean_message(error, 400)}"
+        raise StageError(text, remedy, code="faulty") from error
+    folder = values[0] if values and isinstance(values[0], Path) else Path()
+    if wrong := check(given, folder):
+        raise StageError(f"the writer {called} {wrong}", remedy, code="faulty")
+    return given
+
+
+def _check_files(given: Any, folder: Path) -> str:
+    """What is wrong with what a writer of solids or of a document gave; empty where nothing is."""
+    if not isinstance(given, ExportedFiles):
+        return f"gave a {type(given).__name__}, and has to give an ExportedFiles"
+    for name in given.files:
+        if not isinstance(name, str) or Path(name).is_absolute() or ".." in Path(name).parts:
+            return f"gave the file {name!r}, and has to give paths relative to its folder"
+        if not (folder / name).is_file():
+            return f"says that it wrote {name}, and there is no such file"
+    return ""
+
+
+def _check_note(given: Any, folder: Path) -> str:
+    return "" if given is None or isinstance(given, str) else f"gave a {type(given).__name__}, and has to give a text"
+
+
+def _check_path_notes(given: Any, folder: Path) -> str:
+    if given is None or (isinstance(given, Sequence) and all(isinstance(note, str) for note in given)):
+        return ""
+    return f"gave a {type(given).__name__}, and has to give a sequence of notes, or None"

@@ -1,0 +1,23 @@
+"""The same shape is lost here and added elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from damageest.artefacts import Reason
+from damageest.rules import Rule, ScanFacts, SiteFacts
+
+
+class Revision(Rule):
+    code = "revision"
+    meaning = "metal of the same shape is added elsewhere: the part may be of another revision, where a feature moved"
+    threshold = "volumes within 10 %, and extents (principal radii of gyration) within 12 %"
+    remedy = "compare the scan with the drawing of the part's revision; accept the site if the loss is real"
+
+    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+        for number in site.twins:
+            text = (
+                f"surplus {number} has the same shape: another revision of the part, in which a feature lies "
+                "elsewhere, may have been scanned, and no metal lost"
+            )
+            yield Reason(self.code, text, "contradicts", site.volume, f"{scan.unit}³", remedy=self.remedy)

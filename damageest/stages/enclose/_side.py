@@ -1,0 +1,85 @@
+"""On which side of the damaged points the metal is gone, by what the scan shows of the intact skin at their rim."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.geometry.local_fits import smooth_points
+from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.orientation import find_signs
+from damageest.geometry.rays import prepare_rays
+from damageest.geometry.skin_near import NearCubes
+from damageest.stages.enclose._skin import SkinSamples
+
+RIM = 4.0
+"""How far from the damaged points intact ones show the side, in point spacings or tolerances."""
+THIN = 4.0
+"""Thickest wall that is thin, in point spacings."""
+BELOW = 0.5
+"""Sine of the angle below the damaged surface from which skin lies behind it, and of that by which it faces away."""
+FIT_COUNT = 24
+LEAST_SHARE = 0.1
+"""Share of the skin beside a site that no point shows, which has to be behind for any to be."""
+FEWEST = 8
+"""Intact points at the rim, at least, for them to show the side."""
+
+
+def find_behind(
+    part: Part,
+    aligned: Scan,
+    deviation: Deviation,
+    damaged: Floats,
+    label: Ints,
+    grown: Flags,
+    skin: SkinSamples,
+    cell: float,
+) -> Flags:
+    """Which samples (S,) of the ``skin`` that no point shows lie behind the damaged points (M,3): the far skin of a
+    thin wall, on the side where metal is left.
+
+    An inner surface hangs on the intact skin at its rim, whose outward side is that of the part. It is carried from
+    the intact points to the damaged ones along the scan. None is behind where the scan shows too little of the rim.
+
+    Args:
+        label: (M,) the site of each damaged point.
+        grown: (N,) scan points that count as damaged too.
+        cell: length below which nothing is resolved.
+    """
+    behind = np.zeros(len(skin.points), bool)
+    asked = np.flatnonzero(skin.bare & np.isfinite(skin.away))
+    intact = np.flatnonzero((deviation.label == INTACT) & ~grown)
+    if not len(damaged) or not len(asked) or not len(intact):
+        return behind
+    reach = RIM * max(cell, aligned.spacing)
+    intact = intact[NearCubes.around(damaged, reach).holds(aligned.points[intact])]
+    rim = intact[np.isfinite(find_neighbours(aligned.points[intact], 1, damaged, reach)[0][:, 0])]
+    rim = rim[pick_one_per_cube(aligned.points[rim], 0.5 * cell)] if len(rim) else rim
+    if len(rim) < FEWEST:
+        return behind
+    thin = pick_one_per_cube(damaged, 0.5 * cell)
+    own = damaged[thin]
+    points = np.concatenate([own, aligned.points[rim]])
+    points, normals, _ = smooth_points(points, aligned.noise, min(FIT_COUNT, len(points) // 2))
+    outward = part.face_normals[deviation.face[rim]]
+    evidence = np.concatenate([np.zeros(len(own)), np.einsum("ij,ij->i", normals[len(own) :], outward)])
+    normals *= find_signs(points, normals, evidence)[:, None]
+    distance, near = find_neighbours(skin.points[asked], 1, points[: len(own)])
+    out, site = normals[near[:, 0]], label[thin][near[:, 0]]
+    height = np.einsum("ij,ij->i", skin.points[asked] - points[near[:, 0]], out)
+    is_behind = (height < -BELOW * distance[:, 0]) & (np.einsum("ij,ij->i", skin.normals[asked], out) < -BELOW)
+    is_behind[is_behind] = (
+        _measure_walls(part, skin.points[asked[is_behind]], skin.normals[asked[is_behind]]) < THIN * aligned.spacing
+    )
+    # The far skin is about as large as the lost one. Fewer are places where the normals are wrong.
+    share = np.bincount(site, is_behind) / np.maximum(np.bincount(site), 1)
+    behind[asked] = is_behind & (share[site] > LEAST_SHARE)
+    return behind
+
+
+def _measure_walls(part: Part, skin: Floats, normals: Floats) -> Floats:
+    """How thick (S,) the part is below samples of its ``skin`` (S,3) with outward ``normals`` (S,3)."""
+    if not len(skin):
+        return np.zeros(0)
+    step = 1e-6 * part.diagonal
+    return prepare_rays(part).find_first(skin - step * normals, -normals)[0]
