@@ -5,13 +5,20 @@ from __future__ import annotations
 from dataclasses import asdict
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._process import end_with
 from damageest.cli._streams import say
+
+
+class ElsewhereName(StrEnum):
+    """What is found at no site decides on the part, or is only listed."""
+
+    decides = "decides"
+    listed = "listed"
 
 
 class StepName(StrEnum):
@@ -31,24 +38,39 @@ def command(
     same_setup: Annotated[
         bool, typer.Option("--same-setup", help="The part was not moved since the scan before: take its pose.")
     ] = False,
+    defect: Annotated[
+        float | None,
+        typer.Option(
+            "--defect", help="Width of the least defect that matters, in the job's unit; default: 15 tolerances."
+        ),
+    ] = None,
+    elsewhere: Annotated[
+        ElsewhereName | None,
+        typer.Option("--elsewhere", help="Whether findings at no site decide on the part; default: as the job says."),
+    ] = None,
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
     """Say what is missing and what is over after a step of a repair, and add it to the record in OUT."""
-    end_with(lambda: _inspect(folder, scan, step.value, tolerance, same_setup, as_json), as_json)
+    asked: dict[str, Any] = {"tolerance": tolerance, "same_setup": same_setup, "defect": defect}
+    if elsewhere is not None:
+        asked["elsewhere"] = elsewhere.value
+    end_with(lambda: _inspect(folder, scan, step.value, asked, as_json), as_json)
 
 
-def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_setup: bool, as_json: bool) -> int:
+def _inspect(folder: Path, scan: Path, step: str, asked: dict[str, Any], as_json: bool) -> int:
     """Prints what was found, and gives the exit status: 1 where a tolerance is not met or not shown."""
     from damageest.errors import Fault, InputError, JobError
     from damageest.inspection.aim import read_aim
-    from damageest.inspection.compare import inspect_step
+    from damageest.inspection.compare import ask, inspect_step
+    from damageest.inspection.findings import name_places
     from damageest.inspection.page import write_page
     from damageest.inspection.record import NAME, PAGE, append_inspection, read_record
     from damageest.io.files import check_output_file
 
-    if tolerance is not None and not 0 < tolerance < float("inf"):
-        raise JobError([Fault(f"a tolerance is a number above 0, not {tolerance}")], "--tolerance")
+    for name in ("tolerance", "defect"):
+        if asked[name] is not None and not 0 < asked[name] < float("inf"):
+            raise JobError([Fault(f"a {name} is a number above 0, not {asked[name]}")], f"--{name}")
     if not scan.is_file():
         raise InputError(f"{scan}: there is no such file; give the scan made after the step")
     for name in (NAME, PAGE):
@@ -56,15 +78,18 @@ def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_
     aim = read_aim(folder, step)  # type: ignore[arg-type]
     if (folder / NAME).is_file():
         read_record(folder / NAME, aim)  # a record that cannot take the entry is said before the work
-    found = inspect_step(aim, scan, tolerance, same_setup)
+    found = inspect_step(aim, scan, ask(aim, asked))
     unit = aim.folder.unit
     for one in found.findings:
-        where = f"site {one.site}" if one.site else "elsewhere"
+        where = name_places(one.sites)
         interval = "" if one.low is None else f", 95 %: {one.low:.4g} to {one.high or float('inf'):.4g}"
         say(f"{where}: {one.kind} {one.volume:.4g} {unit}³{interval}, by up to {one.depth:.3g} {unit} ({one.level})")
     for verdict in found.verdicts:
         why = f": {verdict.why}" if verdict.why else ""
-        say(f"site {verdict.site}: tolerance {found.tolerance:.3g} {unit} {verdict.outcome}{why}")
+        shows = "" if verdict.shows is None else f"; shows defects from {verdict.shows:.2g} {unit} across"
+        say(f"site {verdict.site}: tolerance {found.tolerance:.3g} {unit} {verdict.outcome}{why}{shows}")
+    why = f": {found.whole.why}" if found.whole.why else ""
+    say(f"part as a whole: {found.whole.outcome}{why}")
     for number in aim.refused:
         say(f"note: site {number} was not to be repaired, and is not looked at")
     for note in found.notes:
@@ -75,5 +100,6 @@ def _inspect(folder: Path, scan: Path, step: str, tolerance: float | None, same_
     if as_json:
         found_there = {"findings": list(map(asdict, found.findings)), "sites": list(map(asdict, found.verdicts))}
         told = {"folder": folder, "step": step, "units": unit, "tolerance": found.tolerance, **found_there}
+        told |= {"whole": asdict(found.whole), "defect": found.defect}
         say_json({**told, "refused": list(aim.refused), "notes": list(found.notes), "record": folder / NAME})
-    return 0 if all(verdict.outcome == "met" for verdict in found.verdicts) else 1
+    return 0 if found.whole.outcome == "met" else 1

@@ -7,6 +7,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from damageest.inspection.findings import name_places
+
 STYLE = """body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:0 auto;padding:1rem;color:#1c2329}
 h1{font-size:1.5rem}h2{font-size:1.15rem;border-top:1px solid #d8dde1;padding-top:.8rem}
 table{border-collapse:collapse}th{text-align:left;color:#6a757d}td,th{padding:.2rem .8rem .2rem 0;vertical-align:top}
@@ -49,14 +51,20 @@ def describe(record: Mapping[str, Any]) -> str:
 
 
 def _describe_entry(entry: Mapping[str, Any], unit: str) -> str:
+    whole = entry.get("whole")  # entries of older versions have none
     verdicts = "".join(
         f"<p class='{'met' if one['outcome'] == 'met' else 'not'}'>Site {one['site']}: tolerance {one['outcome']}"
-        f"{': ' + _show(one['why']) if one['why'] else ''}</p>"
+        f"{': ' + _show(one['why']) if one['why'] else ''}"
+        f"{_describe_shown(one, unit)}</p>"
         for one in entry["verdicts"]
     )
+    if whole:
+        why = f": {_show(whole['why'])}" if whole["why"] else ""
+        verdicts += f"<p class='{'met' if whole['outcome'] == 'met' else 'not'}'>Part as a whole: "
+        verdicts += f"{_show(whole['outcome'])}{why}</p>"
     findings = _table(
         ["finding", "site", f"volume, {unit}³", "95 %", f"depth, {unit}", "centre", ""],
-        [[one["kind"], one["site"] or "elsewhere", one["volume"], _interval(one), one["depth"],
+        [[one["kind"], name_places(one.get("sites") or [one["site"]]), one["volume"], _interval(one), one["depth"],
           ", ".join(_number(x) for x in one["centre"]), one["level"]] for one in entry["findings"]],
     )  # fmt: skip
     off = entry["pose"]["rms_on_unrepaired"]
@@ -68,6 +76,12 @@ def _describe_entry(entry: Mapping[str, Any], unit: str) -> str:
         f"(rms). Tolerance {_number(entry['tolerance'])} {unit}.</p>{verdicts}{findings}"
         + "".join(f"<p class='note'>{_show(note)}</p>" for note in entry["notes"])
     )
+
+
+def _describe_shown(one: Mapping[str, Any], unit: str) -> str:
+    if one.get("shows") is None:
+        return ""
+    return f"<br><span class='note'>The scan shows defects from {_number(one['shows'])} {unit} across.</span>"
 
 
 def _interval(one: Mapping[str, Any]) -> str:

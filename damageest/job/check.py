@@ -113,7 +113,6 @@ class _Check:
         if self.faults or header is None:
             raise JobError(sorted(self.faults, key=lambda f: (f.line, f.column)), self.source)
         name = header.name or stem
-        output = header.output or Path("out") / name
         return Job(
             name=name,
             units=header.units,
@@ -121,12 +120,13 @@ class _Check:
             method=method,
             stages={c: s for c, s in stages.items() if s is not None},
             implementations={c: pair[0] for c, pair in pairs.items() if pair},
-            output=resolve_path(output, self.folder),
+            output=resolve_path(header.output or Path("out") / name, self.folder),
             source=self.source,
             sites=header.sites,
             accept=header.accept,
             scanner=header.scanner,
             temperature=header.temperature,
+            inspect=header.inspect,
             sections=header.sections,
             given=self.given,
             make_fault=self.make_fault,

@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, FiniteFloat, PositiveInt
 
 from damageest.errors import Fault
+from damageest.job.inspect import InspectChoice
 from damageest.job.scanner import ScannerInfo, Temperature
 from damageest.job.sections import SectionChoice
 from damageest.options import Options, require_number
@@ -76,6 +77,10 @@ class Header(Options):
     temperature: Temperature | None = Field(
         None, description="of the part at the scan: the scan is scaled to 20 °C; default: not known, no correction"
     )
+    inspect: InspectChoice | None = Field(
+        None,
+        description="how scans after the repair are judged by `damageest inspect`; default: by the tolerance alone",
+    )
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
 
 
@@ -102,6 +107,7 @@ class Job:
     scanner: ScannerInfo | None = None
     temperature: Temperature | None = None
     sections: tuple[SectionChoice, ...] = ()
+    inspect: InspectChoice | None = None
     given: Mapping[Contract, Any] = field(default_factory=dict)
     make_fault: Callable[..., Fault] = field(default=_make_fault, compare=False)
 
@@ -111,7 +117,11 @@ class Job:
         head |= {"method": self.method, "sites": to_plain(self.sites.model_dump(), beside)}
         head |= {"sections": [to_plain(one.model_dump(exclude_defaults=True), beside) for one in self.sections]}
         head |= {"accept": to_plain(self.accept, beside)}
-        for name, told in (("scanner", self.scanner), ("temperature", self.temperature)):
+        for name, told in (
+            ("scanner", self.scanner),
+            ("temperature", self.temperature),
+            ("inspect", self.inspect),
+        ):
             if told is not None:
                 head[name] = to_plain(told.model_dump(), beside)
         whole_job = EncloseAll in self.stages

@@ -118,6 +118,29 @@ def test_a_good_part_after_milling_is_met_and_appended(repair: Repair) -> None:
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("kind", ["ground", "bead"])
+def test_what_is_larger_than_the_site_makes_it_not_met(repair: Repair, kind: str) -> None:
+    """The finding has most of its points elsewhere, and all of the site's."""
+    whole = to_manifold(repair.aim.nominal)
+    low, high = whole.bounding_box()[:3], whole.bounding_box()[3:]
+    if kind == "ground":
+        faulty = whole - Manifold.cube((100, 100, 9), True).translate((0, 0, high[2] + 4.5 - 0.6))
+    else:
+        bead = Manifold.cylinder(high[0] - low[0] - 4, 1.5, 1.5, 32, True).rotate((0, 90, 0))
+        faulty = whole + bead.translate((0, 0, high[2]))
+    write_scan(faulty, repair.folder / f"{kind}.ply", 0.7)
+    done = inspect(repair.folder, f"{kind}.ply", "milled")
+    assert done.exit_code == 1, done.output
+    entry = read_record(repair.folder / "out/record.json", repair.aim)["inspections"][-1]
+    (verdict,) = entry["verdicts"]
+    assert verdict["outcome"] == "not met"
+    assert set(entry["findings"][0]["sites"]) == {0, 1}
+    if kind == "ground":
+        assert verdict["lowest"] == pytest.approx(-0.6, abs=0.1)
+    assert entry["whole"]["outcome"] == "not met"
+
+
+@pytest.mark.slow
 def test_a_repair_that_the_scan_does_not_show_is_not_met(repair: Repair) -> None:
     points = scan_mesh(repair.aim.nominal, 0.7, 0.03)
     hidden = (points[:, 2] > 9) & (points[:, 0] > 1) & (points[:, 0] < 9) & (abs(points[:, 1]) < 9)
