@@ -15,11 +15,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[1]
-TOTAL = 61_000
+TOTAL = 30_000
 """Most words in all pages."""
-PAGE = 5_600
+PAGE = 2_000
 """Most words on one page."""
-README = 1_300
+README = 900
 CHANGELOG = 60
 """Most lines of the first release in CHANGELOG.md."""
 GENERATED = "<!-- Generated"

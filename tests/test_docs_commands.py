@@ -24,7 +24,8 @@ from damageest.registry import Registry
 from tests.needs import PLUGINS, needs_plugin
 
 ROOT = Path(__file__).parents[1]
-PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+DOCS = ROOT / "docs"
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted(DOCS.glob("*.md")), *sorted(DOCS.glob("stages/*.md"))]
 
 
 def blocks(page: Path, language: str) -> list[str]:
@@ -88,11 +89,9 @@ REASONS = {
     "needs a container engine": ["install.md: docker build --target core -t damageest ."],
     "needs a file of the reader": ["inspect.md: damageest inspect out/blade after.ply --step deposited"],
     "takes hours": [
+        "accuracy.md: damageest evaluate",
+        "adaptive.md: damageest evaluate",
         "exact-step.md: python -m damageest_cadquery.evaluate",
-        "large.md: /usr/bin/time -v damageest run --no-cache job.yaml",
-        "measurements.md: damageest evaluate",
-        "model-fit.md: damageest evaluate",
-        "model-fit.md: python -m damageest_evaluate.forms",
         "your-own-scan.md: damageest evaluate",
     ],
 }
@@ -141,7 +140,7 @@ def test_the_runner_keeps_place_and_environment_and_counts_failures(tmp_path: Pa
 
 
 def test_pages_show_commands() -> None:
-    assert {page.name for page, _ in SHOWN} >= {"README.md", "first-repair.md", "your-own-scan.md", "measurements.md"}
+    assert {page.name for page, _ in SHOWN} >= {"README.md", "first-repair.md", "your-own-scan.md", "accuracy.md"}
 
 
 MONTHS = ("scans/block_may.ply", "scans/block_june.ply")
@@ -222,7 +221,8 @@ def test_links_lead_to_files(page: Path) -> None:
 
 
 def test_the_legend_of_the_measurements_is_that_of_the_tables() -> None:
-    text = " ".join((ROOT / "docs" / "measurements.md").read_text().replace("\n- ", "\n").split())
+    page = ROOT / "benchmarks" / "results" / "damages.md"
+    text = " ".join(page.read_text().replace("\n- ", "\n").split())
     for sentence in (*make_legend("mm").split(". "), MATRIX):
-        assert sentence.rstrip(".") in text, "docs/measurements.md explains the columns once: bring it up to date"
+        assert sentence.rstrip(".") in text, "damages.md explains the columns once: bring it up to date"
         assert text.count(sentence.rstrip(".")) == 1

@@ -28,18 +28,6 @@ def list_provided(registry: Registry) -> dict[str, list[str]]:
 
 
 @needs_plugin(*PLUGINS)
-def test_the_readme_lists_every_implementation(registry: Registry) -> None:
-    rows = read_table((ROOT / "README.md").read_text(), "| stage | what it does | implementations |\n")
-    assert [row[0] for row in rows] == list(STAGES)
-    listed = {row[0]: row[2].split(", ") for row in rows}
-    assert {stage: sorted(names) for stage, names in listed.items()} == {
-        stage: sorted(names) for stage, names in list_provided(registry).items()
-    }
-    for stage, names in listed.items():
-        assert names[0] in {name for contract, name in DEFAULTS.items() if contract.stage == stage}, "default first"
-
-
-@needs_plugin(*PLUGINS)
 def test_the_page_of_stages_lists_every_implementation(registry: Registry) -> None:
     rows = read_table((DOCS / "stages.md").read_text(), "| stage | implementation | when to take it |\n")
     listed: dict[str, list[str]] = {}

@@ -50,3 +50,8 @@ def test_what_is_too_long_is_named() -> None:
     pages = {"README.md": WORDS.README + 1, "docs/a.md": WORDS.PAGE + 1, "docs/b.md": WORDS.TOTAL}
     named = [fault.split(":")[0] for fault in WORDS.find_faults(pages)]
     assert set(named) == {"README.md", "docs/a.md", "docs/b.md", "all pages"}
+
+
+def test_the_changelog_says_in_few_lines_what_the_first_release_does() -> None:
+    lines = WORDS.count_release((ROOT / "CHANGELOG.md").read_text())
+    assert 0 < lines <= WORDS.CHANGELOG

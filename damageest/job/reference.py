@@ -82,7 +82,7 @@ def _describe_stage(stage: str, registry: Registry) -> Iterator[str]:
     for contract in contracts:
         yield f"{_unwrap(contract).splitlines()[0]} {_say_when(contract)}\n"
     for item in registry.of(stage):
-        yield from _describe_implementation(item)
+        yield from describe_implementation(item)
 
 
 def _say_when(contract: Contract) -> str:
@@ -91,7 +91,8 @@ def _say_when(contract: Contract) -> str:
     return f"{often}{', with `method: surface` only' if contract in SURFACE_ONLY else ''}."
 
 
-def _describe_implementation(item: Implementation) -> Iterator[str]:
+def describe_implementation(item: Implementation) -> Iterator[str]:
+    """The lines of an implementation: its docstring, its package, and its options as tables."""
     default = DEFAULTS[item.contract] == item.name
     yield f"### {item.contract.stage}: {item.name}\n"
     facts = [f"Package `{item.provider.name}`."]

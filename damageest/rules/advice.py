@@ -42,20 +42,18 @@ TOPICS = (
         "unit",
         "The unit is wrong",
         ("unit",),
-        "Look up in the scanner's software in which unit it wrote the file, or measure one length of the part in "
-        "the scan. Give that unit for the scan, and not for the job, so that the results stay in the unit of the "
-        "CAD model. A tolerance that damageest init measured before is wrong by the same factor: write the job again "
-        "with --scan-unit, or take tolerance: auto.",
+        "Look up the unit in the scanner's software, or measure one length of the part in the scan. Give that unit "
+        "for the scan, not for the job: results stay in the unit of the CAD model. A tolerance that damageest init "
+        "measured is wrong by the same factor: write the job again with --scan-unit, or take tolerance: auto.",
         "scan: {path: scan.ply, unit: m}",
     ),
     Topic(
         "surroundings",
         "Other things are in the scan",
         ("surroundings", "far_points", "filled_points"),
-        "Cut off the table, clamps, markers and powder that do not belong to the part, in the scanner's software or "
-        "in the job. Crops are in the scan's own frame. What touches the part cannot be told from added metal: cut "
-        "it off by hand. Powder on the skin makes the part larger by its thickness: spray thinly, or clean the "
-        "part.",
+        "Cut off the table, clamps, markers and powder in the scanner's software or in the job. Crops are in the "
+        "scan's own frame. What touches the part looks like added metal: cut it off by hand. Powder makes the part "
+        "larger by its thickness: spray thinly, or clean the part.",
         "scan:\n"
         "  path: scan.ply\n"
         "  crop:\n"
@@ -66,28 +64,28 @@ TOPICS = (
         "pose",
         "The pose is not certain",
         ("align", "pose", "another_part", "other_poses", "pose_free", "mirrored", "given_pose"),
-        "Open report.html and see whether the scan lies on the part. Scan more of it: faces in three directions, "
-        "and what makes the part unsymmetric, as a keyway. On a symmetric part the volume is right in each pose, "
-        "but the machine has to use the same one. Where the pose is wrong, pick three or more pairs of points, each "
-        "first in the scan, then on the part; where the scan is in the part's frame already, take align: none.",
+        "Open report.html and see whether the scan lies on the part. Scan faces in three directions, and features "
+        "that break the symmetry, such as a keyway. On a symmetric part the volume is right in each pose, but the "
+        "machine has to use the same one. Where the pose is wrong, pick three or more pairs of points, each first "
+        "in the scan, then on the part. Where the scan is in the part's frame, take align: none.",
         "align: {use: points, pairs: [[[1, 2, 3], [41, 2, 3]], [[1, 52, 3], [41, 52, 3]], [[1, 2, 63], [41, 2, 63]]]}",
     ),
     Topic(
         "noise",
         "The noise is large for the tolerance",
         ("tolerance_small", "tolerance_raised", "below_noise", "depth_steps", "thin_walls", "scattered", "fading"),
-        "Take tolerance: auto, or a tolerance of four times the noise that the run prints. A shallower loss is not "
-        "in this scan, whatever the tolerance: scan from nearer, with more exposures, or with a better scanner. Do "
-        "not smooth the scan: that rounds the rims of the damage and hides the noise from the check.",
+        "Take tolerance: auto, or four times the noise that the run prints. This scan cannot show a shallower "
+        "loss: scan from nearer, with more exposures, or with a better scanner. Do not smooth the scan: that "
+        "rounds the rims of the damage and hides the noise from the check.",
         "tolerance: auto",
     ),
     Topic(
         "sparse",
         "The points are too few",
         ("few_points", "sparse_scan", "beyond_points"),
-        "Export the scan at full resolution, as points or as a mesh that was not decimated: of a mesh only the "
-        "vertices are used. Three to five points should lie across the smallest damage that matters. Where only "
-        "some places are thin, scan these again and give all files as a list.",
+        "Export the scan at full resolution, as points or as a mesh that was not decimated: only the vertices of a "
+        "mesh are used. Three to five points should lie across the smallest damage that matters. Scan thin places "
+        "again and give all files as a list.",
         "scan: {use: file, path: [view-1.ply, view-2.ply]}",
     ),
     Topic(
@@ -95,19 +93,17 @@ TOPICS = (
         "The scan has holes and shadows",
         ("inner_surface", "beside", "not_visible"),
         "Open unseen.ply over the CAD model, turn the part, and scan these places, above all into the damage and "
-        "beside it. Give the position of the scanner for each view: rays then tell a place that was seen through "
-        "from one that was not seen. Do not fill holes in the scanner's software: a filled hole looks like metal "
-        "that is there.",
+        "beside it. Give the position of the scanner for each view: rays then tell empty space from unseen space. "
+        "Do not fill holes in the scanner's software: a filled hole looks like metal.",
         "scan:\n  - {path: view-1.ply, viewpoint: [0, -400, 350]}\n  - {path: view-2.ply, viewpoint: [0, 400, 350]}",
     ),
     Topic(
         "views",
         "The views do not fit together",
         ("two_sheets", "one_motion", "misplaced_view"),
-        "Register the views to each other again. Or give each view as a file of its own, with the position of its "
-        "scanner: align: register then compares them and puts each view right that fixes its pose by itself. Views "
-        "that were merged into one file are told apart only where they follow each other in it. To find out which view "
-        "is wrong, run each alone.",
+        "Register the views to each other again. Or give each view as its own file with the position of its "
+        "scanner: align: register then corrects each view that fixes its own pose. Views in one file are told "
+        "apart only where they follow each other in it. To find the wrong view, run each alone.",
         "scan:\n"
         "  - {path: view-1.ply, viewpoint: [0, -400, 350]}\n"
         "  - {path: view-2.ply, viewpoint: [0, 400, 350]}\n"
@@ -117,35 +113,35 @@ TOPICS = (
         "stray",
         "Points lie where nothing is",
         ("speck", "low_confidence"),
-        "Remove stray points and points at the edges in the scanner's software, by its filter for outliers or for "
-        "edges. Where the file has a confidence for each point, those below a value can be set aside; compare with "
-        "a run without it, since points in a damage are often those of least confidence.",
+        "Remove stray points and points at edges by the filters of the scanner's software. Where the file has a "
+        "confidence, points below a value can be set aside. Compare with a run without the limit: points in a "
+        "damage often have the least confidence.",
         "scan: {path: scan.ply, min_confidence: 0.3}",
     ),
     Topic(
         "form",
         "The part is bent, or the scan is scaled",
         ("model_fit", "adapt", "adapted_skin"),
-        "Measure one length of the part and compare it with the scan. If the scan is wrong, correct its scale; if "
+        "Measure one length of the part and compare it with the scan. If the scan is wrong, correct its scale. If "
         "the part is bent or twisted, adapt: auto, the default, bends the CAD model until it follows the intact "
-        "skin. Look at scan.ply by distance: what is left should be even noise, without bands.",
+        "skin. Colour scan.ply by distance: the rest should be even noise, without bands.",
         "scan: {path: scan.ply, scale: auto}\nadapt: auto",
     ),
     Topic(
         "wear",
         "A whole face is worn",
         ("free_pose", "wide_loss"),
-        "Name faces that are not worn, as journals, a foot or end faces: only they fix the pose then. `damageest "
-        "faces` lists the faces of a STEP file. Where the pose is known, as from a fixture, give it instead.",
+        "Name unworn faces, such as journals, a foot or end faces: only they fix the pose then. `damageest faces` "
+        "lists the faces of a STEP file. Where a fixture gives the pose, take align: none.",
         "align:\n  use: register\n  datum: [{facing: {direction: [0, 0, -1], angle: 5}}]",
     ),
     Topic(
         "surplus",
         "Metal or dirt lies on the part",
         ("covered", "displaced", "displaced_piece", "revision", "surplus"),
-        "Remove the weld bead, spatter or dirt, and scan again, where it lies on a damage: what is lost under it "
-        "cannot be seen. A piece that was pushed aside is no loss: put it back, or accept the site to repair it as "
-        "if the piece were lost. Surplus elsewhere changes no volume.",
+        "Remove weld beads, spatter or dirt from the damage, and scan again: a loss below them cannot be seen. A "
+        "displaced piece is no loss: put it back, or accept the site to repair it as if the piece were lost. "
+        "Surplus elsewhere changes no volume.",
         "accept: [1]",
     ),
     Topic(
@@ -153,8 +149,8 @@ TOPICS = (
         "A site is doubtful, or its interval is wide",
         ("nothing", "wide_interval", "off_boundary", "intact_inside", "intact_over"),
         "Read its reasons in the report and look at the place on the part. If the metal is missing there, accept "
-        "the site by its number; if it is not, drop it. A better scan of this place makes the interval narrower; a "
-        "larger tolerance makes shallow sites go away that are errors of the scan.",
+        "the site by its number; if not, drop it. A better scan of this place makes the interval narrower. A "
+        "larger tolerance removes shallow sites that are errors of the scan.",
         "accept: [3, 5] # these doubtful sites beside the likely ones\nsites: {drop: [2]}",
     ),
 )

@@ -1,6 +1,7 @@
 """How exactly the model fit names scale, bending and twisting, and whether it names them where there are none.
 
-``python -m damageest_evaluate.forms`` prints the table of docs/model-fit.md; ``--clean 208`` runs the cases of
+``python -m damageest_evaluate.forms`` prints the table of forms in benchmarks/results/troubles.md; ``--clean 208``
+runs the cases of
 `damageest evaluate suite` instead, which are not deformed. Both scan in a pose that is off by a part of a tolerance;
 ``--register`` finds it with `align: register`.
 """

@@ -21,7 +21,7 @@ from tests import damaged_box
 from tests.needs import PLUGINS, needs_plugin
 
 BEGIN, END = make_marks("matrix")
-PAGE = Path(__file__).parents[3] / "docs" / "measurements.md"
+PAGE = Path(__file__).parents[3] / "benchmarks" / "results" / "damages.md"
 JOB = """\
 version: 1
 tolerance: 0.2

@@ -23,7 +23,7 @@ from damageest.registry import Registry
 from damageest.stages.part import ReadPart
 from tests.needs import needs_plugin
 
-PAGE = Path(__file__).parents[3] / "docs" / "measurements.md"
+PAGE = Path(__file__).parents[3] / "benchmarks" / "results" / "damages.md"
 BEGIN, END = make_marks("suite")
 
 
@@ -114,7 +114,7 @@ def test_a_page_without_marks_is_refused_before_anything_runs(tmp_path: Path) ->
 
 def test_the_table_in_the_docs_is_of_this_suite(registry: Registry) -> None:
     found = tables(PAGE.read_text())
-    assert found, "the table is missing: damageest evaluate suite --write docs/measurements.md"
+    assert found, "the table is missing: damageest evaluate suite --write benchmarks/results/damages.md"
     assert found[0][0][0] == "part"
     check(found[0], {*PARTS, "all"})
     assert {line[0] for line in found[0][2:]} == {*PARTS, "all"}
