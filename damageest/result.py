@@ -156,7 +156,8 @@ class Result:
     not tell, in words; ``certificate``: scanner and standard, as the job has them. ``adapted``: how ``part`` was
     deformed to follow the scan; None: it is the part as designed. ``sections``: those that the job asks
     for, of the part as designed, in the pose of the run. ``conversions``: what plugins can convert it to, see
-    `convert`.
+    `convert`. ``scan_factor``: what the lengths of ``scan`` were divided by, for temperature and scale, about
+    ``scan_centre`` (3,); see `transform_to_scan` and `raw_points`.
     """
 
     name: str
@@ -187,6 +188,8 @@ class Result:
     certificate: str = ""
     sections: tuple[Section, ...] = ()
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
+    scan_factor: float = 1.0
+    scan_centre: Floats | None = None
 
     def __repr__(self) -> str:
         levels = ", ".join(f"{site.id} {site.verdict.level}" for site in self.sites) or "none"
@@ -316,11 +319,28 @@ class Result:
         plotter = self.convert("plotter", "window" if show else "result", site)
         return plotter.show() if show else plotter
 
+    @property
+    def transform_to_scan(self) -> Floats:
+        """(4,4) takes a point of the part to where the scanner saw it. Rigid, but where the lengths of the scan were
+        corrected: there it has their factor."""
+        T = invert_pose(self.pose)
+        if self.scan_factor != 1 and self.scan_centre is not None:
+            T[:3, 3] = self.scan_centre + self.scan_factor * (T[:3, 3] - self.scan_centre)
+            T[:3, :3] *= self.scan_factor
+        return T
+
+    @property
+    def raw_points(self) -> Floats:
+        """(N,3) the points of the scan as the scanner gave them, in ``units``."""
+        if self.scan_factor == 1 or self.scan_centre is None:
+            return self.scan.points
+        return np.asarray(self.scan_centre + self.scan_factor * (self.scan.points - self.scan_centre))
+
     def _transform_to(self, frame: str) -> Floats | None:
         """T (4,4) that takes a point of the part to a frame; None for the part's own."""
         if frame not in ("part", "scan"):
             raise ValueError(f"no frame '{frame}'; there are: part, scan")
-        return invert_pose(self.pose) if frame == "scan" else None
+        return self.transform_to_scan if frame == "scan" else None
 
 
 def _choose_mesh(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:

@@ -48,6 +48,12 @@ def command(
         ElsewhereName | None,
         typer.Option("--elsewhere", help="Whether findings at no site decide on the part; default: as the job says."),
     ] = None,
+    fixture: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--fixture", metavar="X,Y,Z,X,Y,Z", help="A box in which points are a fixture's. May be repeated."
+        ),
+    ] = None,
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
@@ -55,10 +61,24 @@ def command(
     asked: dict[str, Any] = {"tolerance": tolerance, "same_setup": same_setup, "defect": defect}
     if elsewhere is not None:
         asked["elsewhere"] = elsewhere.value
-    end_with(lambda: _inspect(folder, scan, step.value, asked, as_json), as_json)
+    end_with(lambda: _inspect(folder, scan, step.value, asked, fixture or [], as_json), as_json)
 
 
-def _inspect(folder: Path, scan: Path, step: str, asked: dict[str, Any], as_json: bool) -> int:
+def _read_box(text: str) -> dict[str, list[float]]:
+    """A box from the six coordinates of its corners."""
+    from damageest.errors import Fault, JobError
+
+    try:
+        values = [float(word) for word in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) != 6 or not all(low < high for low, high in zip(values[:3], values[3:], strict=True)):
+        text = f"a box is its lowest and its highest corner, as 0,0,0,10,10,5, not '{text}'"
+        raise JobError([Fault(text)], "--fixture")
+    return {"min": values[:3], "max": values[3:]}
+
+
+def _inspect(folder: Path, scan: Path, step: str, asked: dict[str, Any], fixtures: list[str], as_json: bool) -> int:
     """Prints what was found, and gives the exit status: 1 where a tolerance is not met or not shown."""
     from damageest.errors import Fault, InputError, JobError
     from damageest.inspection.aim import read_aim
@@ -71,6 +91,8 @@ def _inspect(folder: Path, scan: Path, step: str, asked: dict[str, Any], as_json
     for name in ("tolerance", "defect"):
         if asked[name] is not None and not 0 < asked[name] < float("inf"):
             raise JobError([Fault(f"a {name} is a number above 0, not {asked[name]}")], f"--{name}")
+    if fixtures:
+        asked["fixtures"] = tuple(_read_box(text) for text in fixtures)
     if not scan.is_file():
         raise InputError(f"{scan}: there is no such file; give the scan made after the step")
     for name in (NAME, PAGE):

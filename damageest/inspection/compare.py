@@ -17,6 +17,7 @@ from damageest.api import run
 from damageest.artefacts import Flags
 from damageest.inspection.aim import Aim
 from damageest.inspection.findings import Finding, list_findings
+from damageest.inspection.joined import find_bodies, keep_joined, list_joined
 from damageest.inspection.places import cut_places, land_points
 from damageest.inspection.verdicts import Verdict, WholeVerdict, judge_site, judge_whole
 from damageest.result import Result
@@ -35,12 +36,14 @@ class Question:
     """What is asked of an inspection. ``tolerance``: None: that of the run before. ``same_setup``: the part was not
     moved between the scans, and has the pose of the first one. ``defect``: width of the least defect that matters;
     None: `DEFECT` tolerances. ``elsewhere``: whether what is found at no site decides on the part, or is only listed.
+    ``fixtures``: boxes in the part's frame, with ``min`` and ``max``, in which points are no part's.
     """
 
     tolerance: float | None = None
     same_setup: bool = False
     defect: float | None = None
     elsewhere: Literal["decides", "listed"] = "decides"
+    fixtures: tuple[Mapping[str, Any], ...] = ()
 
 
 @dataclass(frozen=True)
@@ -86,31 +89,34 @@ def inspect_step(aim: Aim, scan: Path, question: Question = Question()) -> Inspe
     }  # fmt: skip
     result = run(job, part=aim.target)
     places = {number: cut_places(aim.target, body, OWN * allowed, defect) for number, body in aim.deposits.items()}
-    counted = np.flatnonzero(_count_as_part(result))
+    bodies = find_bodies(result)
+    fixed = _find_fixed(result, question.fixtures)
+    counted = np.flatnonzero(~fixed)
     points, distance = result.aligned.points[counted], result.deviation.distance[counted]
     landed = {
-        number: replace(one, index=counted[one.index])
+        number: keep_joined(replace(one, index=counted[one.index]), bodies, allowed, float(result.scan.spacing))
         for number, own in places.items()
         if own is not None
         for one in (land_points(own, aim.target, points, distance),)
     }
-    findings = list_findings(aim, result, landed)
+    joined, told = list_joined(result, bodies, places, landed)
+    findings = (*list_findings(aim, result, landed, fixed), *joined)
     unit, noise = result.units, float(result.aligned.noise)
     verdicts = tuple(
         judge_site(number, own, landed.get(number), findings, allowed, noise, unit) for number, own in places.items()
     )
     whole = judge_whole(verdicts, findings, question.elsewhere, unit)
     off = _measure_fit(aim, result)
-    return Inspection(findings, verdicts, whole, pose, off, _list_notes(result), allowed, defect, result)
+    return Inspection(findings, verdicts, whole, pose, off, (*told, *_list_notes(result)), allowed, defect, result)
 
 
-def _count_as_part(result: Result) -> Flags:
-    """Which points of the scan (N,) are no surroundings."""
-    own = np.ones(len(result.aligned.points), bool)
-    for item in result.surplus:
-        if item.kind == "surroundings":
-            own[item.points] = False
-    return own
+def _find_fixed(result: Result, fixtures: tuple[Mapping[str, Any], ...]) -> Flags:
+    """Which points of the scan (N,) lie in fixtures that the job names."""
+    points = result.aligned.points
+    inside = np.zeros(len(points), bool)
+    for box in fixtures:
+        inside |= ((points >= np.array(box["min"])) & (points <= np.array(box["max"]))).all(axis=1)
+    return inside
 
 
 def _choose_pose(content: Mapping[str, Any], same_setup: bool) -> tuple[Any, str]:

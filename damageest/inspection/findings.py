@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Vector
+from damageest.artefacts import Flags, Floats, Ints, Vector
 from damageest.geometry.solids import to_manifold
 from damageest.inspection.aim import Aim, cut_volume
 from damageest.inspection.places import Landed
@@ -18,6 +18,8 @@ ELSEWHERE = 0
 """Number of the site that stands for the rest of the part."""
 FEWEST = 3
 """Points of a finding on a site's skin from which it lies there."""
+FIXED = 0.5
+"""Share of the points of a surplus that lie in fixtures, above which it is one."""
 BESIDE = 0.05
 """Share of a finding's points, and `FEWEST` of them, that lie on no site's skin where it lies elsewhere too."""
 Kind = Literal["missing", "stock short", "over"]
@@ -41,12 +43,13 @@ class Finding:
     sites: tuple[int, ...] = ()
 
 
-def list_findings(aim: Aim, result: Result, landed: Mapping[int, Landed]) -> tuple[Finding, ...]:
-    """What is missing, what is short and what is over. ``landed``: the points on each site's skin."""
+def list_findings(aim: Aim, result: Result, landed: Mapping[int, Landed], fixed: Flags) -> tuple[Finding, ...]:
+    """What is missing, what is short and what is over. ``landed``: the points on each site's skin; ``fixed``
+    (N,): which points of the scan lie in fixtures."""
     of = np.zeros(len(result.aligned.points), np.int64)
     for number, one in landed.items():
         of[one.index] = number
-    return (*_list_missing(aim, result, of), *_list_over(result, of))
+    return (*_list_missing(aim, result, of), *_list_over(result, of, fixed))
 
 
 def name_places(sites: Sequence[int]) -> str:
@@ -66,7 +69,7 @@ def _list_missing(aim: Aim, result: Result, of: Ints) -> list[Finding]:
         interval = site.volume_95
         low, high = (None, None) if interval is None else interval
         total = below + above
-        at = _to_vector(site.centroid)
+        at = to_vector(site.centroid)
         kinds: tuple[tuple[Kind, float], ...] = (("missing", below), ("stock short", above))
         for kind, volume in kinds:
             if volume > 0.02 * total:
@@ -78,13 +81,13 @@ def _list_missing(aim: Aim, result: Result, of: Ints) -> list[Finding]:
     return found
 
 
-def _list_over(result: Result, of: Ints) -> list[Finding]:
+def _list_over(result: Result, of: Ints, fixed: Flags) -> list[Finding]:
     found = []
     for item in result.surplus:
-        if item.kind == "surroundings":
+        if item.kind == "surroundings" or fixed[item.points].mean() > FIXED:
             continue
         sites = _find_sites(of[item.points], result.deviation.distance[item.points], result.tolerance)
-        at = _to_vector(result.aligned.points[item.points].mean(axis=0))
+        at = to_vector(result.aligned.points[item.points].mean(axis=0))
         volume = item.volume if item.volume is not None else item.estimate
         level = "likely" if item.solid is not None else "estimated"
         found.append(Finding("over", sites[0], float(volume), None, None, float(item.height), at, level, sites))
@@ -102,6 +105,7 @@ def _find_sites(of: Ints, distance: Floats, tolerance: float) -> tuple[int, ...]
     return tuple(number for number in order if counts[number] >= least[number]) or tuple(order[:1]) or (ELSEWHERE,)
 
 
-def _to_vector(values: Floats) -> Vector:
+def to_vector(values: Floats) -> Vector:
+    """Three numbers as a tuple."""
     x, y, z = values.tolist()
     return x, y, z

@@ -11,7 +11,6 @@ from typing import Annotated, Any, Literal
 from pydantic import BeforeValidator, Field, FiniteFloat, PositiveInt
 
 from damageest.errors import Fault
-from damageest.job.inspect import InspectChoice
 from damageest.job.scanner import ScannerInfo, Temperature
 from damageest.job.sections import SectionChoice
 from damageest.options import Options, require_number
@@ -44,6 +43,20 @@ class SiteChoice(Options):
         (), description="lists of numbers of sites that are one; the site gets the lowest number"
     )
     keep: Box | None = Field(None, description="only sites the middle of whose bounds is in this box; default: all")
+
+
+class InspectChoice(Options):
+    """How scans after a step of the repair are judged, by `damageest inspect`."""
+
+    defect: float | None = Field(
+        None, gt=0, description="width of the least defect that matters, in the job's unit; default: 15 tolerances"
+    )
+    elsewhere: Literal["decides", "listed"] = Field(
+        "decides", description="what is found at no site makes the part not met (decides), or is only listed"
+    )
+    fixtures: tuple[Box, ...] = Field(
+        (), description="boxes in which points are a fixture's; default: what touches a site counts as the part's"
+    )
 
 
 class Header(Options):

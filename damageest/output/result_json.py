@@ -69,6 +69,11 @@ class ScanReport(JsonModel):
     notes: list[str]
 
 
+class RescaledReport(JsonModel):
+    factor: float = Field(description="what the lengths of the scan were divided by, for temperature and scale")
+    centre: Vector = Field(description="the place in the scanner's frame about which they were, which stays")
+
+
 class AlignmentReport(JsonModel):
     transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
     quaternion: tuple[float, float, float, float] = Field(description="its rotation: w, x, y, z; w is not negative")
@@ -86,6 +91,11 @@ class AlignmentReport(JsonModel):
         description="motions that the datum system leaves free, and that the rest of the skin fixes"
     )
     held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
+    rescaled: RescaledReport | None = Field(
+        None,
+        description="only where the lengths of the scan were corrected: a raw point x is at "
+        "transform (centre + (x - centre) / factor) in the part",
+    )
 
 
 class ExportReport(JsonModel):
@@ -196,6 +206,9 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             translation=pose.T_part_scan[:3, 3],
             alternatives=[] if pose.alternatives is None else pose.alternatives,
             held=pose.is_held,
+            rescaled=None
+            if result.scan_factor == 1 or result.scan_centre is None
+            else RescaledReport(factor=result.scan_factor, centre=tuple(result.scan_centre.tolist())),
         ),
         deviation=report_deviation(result.deviation),
         adapt=report_adapt(result.adapted, result.sites),
@@ -209,7 +222,10 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
         versions={"damageest": version("damageest"), "python": platform.python_version()},
         provenance=None,
     )
-    return filled.model_dump(mode="json", by_alias=True)
+    content = filled.model_dump(mode="json", by_alias=True)
+    if content["alignment"]["rescaled"] is None:
+        del content["alignment"]["rescaled"]
+    return content
 
 
 def to_dict(result: Result, what: str, site: int | None) -> dict[str, Any]:

@@ -26,7 +26,7 @@ from damageest.rules.notes import make_notes, rank_notes
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
         "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
-        "scanner_errors", "conversions", "sections",
+        "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -79,6 +79,8 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         certificate=state.scanner_errors.certificate,
         conversions={"dict": to_dict, **state.conversions},
         sections=state.sections,
+        scan_factor=state.thermal_scale * state.corrected_scale,
+        scan_centre=state.scan_centre,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
 

@@ -58,8 +58,9 @@ def correct_views(
 
 @step(gives=("scan", "pose", "aligned", "corrected_scale"))
 def correct_scale(
-    part: Part, scan: Scan, pose: Pose, aligned: Scan, tolerance: float, unit: str, reader: ReadScan | None
-) -> tuple[Scan, Pose, Scan, float]:
+    part: Part, scan: Scan, pose: Pose, aligned: Scan, tolerance: float, unit: str, reader: ReadScan | None,
+    scan_centre: Floats,
+) -> tuple[Scan, Pose, Scan, float]:  # fmt: skip
     """Corrects the scan's scale where it is wrong and the job says so, and gives the scale that was taken out."""
     if reader is None or not reader.finds_scale:
         return scan, pose, aligned, 1.0
@@ -72,19 +73,25 @@ def correct_scale(
     # x = s R' p, undone by T and then by the scale about the frame's centre: a rigid motion of the scaled scan
     T = form.T @ pose.T_part_scan
     T[:3, 3] = (T[:3, 3] - form.frame.centre) / scale + form.frame.centre
-    pose = replace(pose, T_part_scan=_make_rigid(T))
+    T = _make_rigid(T)
+    T[:3, 3] -= (1 - 1 / scale) * T[:3, :3] @ scan_centre  # which stays where it is
+    pose = replace(pose, T_part_scan=T)
     moved = form.undo(aligned.points)
-    corrected = divide_scan(replace(aligned, points=moved * scale), scale)
+    corrected = divide_scan(replace(aligned, points=moved * scale), scale, np.zeros(3))
     if aligned.viewpoints is not None:
         corrected = replace(corrected, viewpoints=form.undo(aligned.viewpoints))
-    return divide_scan(scan, scale), pose, corrected, scale
+    return divide_scan(scan, scale, scan_centre), pose, corrected, scale
 
 
-def divide_scan(scan: Scan, scale: float) -> Scan:
-    """The scan with all of its lengths divided by a scale, about the origin of its frame."""
-    viewpoints = None if scan.viewpoints is None else scan.viewpoints / scale
+def divide_scan(scan: Scan, scale: float, centre: Floats) -> Scan:
+    """The scan with all of its lengths divided by a scale, about a place (3,) of its frame, which stays."""
+
+    def divide(places: Floats) -> Floats:
+        return np.asarray(centre + (places - centre) / scale)
+
+    viewpoints = None if scan.viewpoints is None else divide(scan.viewpoints)
     return replace(
-        scan, points=scan.points / scale, viewpoints=viewpoints, noise=scan.noise / scale, spacing=scan.spacing / scale
+        scan, points=divide(scan.points), viewpoints=viewpoints, noise=scan.noise / scale, spacing=scan.spacing / scale
     )
 
 

@@ -56,7 +56,7 @@ def where_thinned(*route: Contract | AnyStep) -> Branch:
 @step(gives="scan", kept=True)
 def add_points_near_damage(
     engine: Engine, reader: ReadScan | None, scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str,
-    thermal_scale: float,
+    thermal_scale: float, scan_centre: Floats,
 ) -> Scan:  # fmt: skip
     """Adds all points near damage to the scan. The spacing is then that near damage."""
     assert reader is not None  # as `where_thinned` asks
@@ -65,7 +65,7 @@ def add_points_near_damage(
 
     def read() -> Iterator[Scan]:
         pieces = _crop(_read(engine, reader, unit), reader.crop)
-        return pieces if thermal_scale == 1 else (divide_scan(piece, thermal_scale) for piece in pieces)
+        return pieces if thermal_scale == 1 else (divide_scan(piece, thermal_scale, scan_centre) for piece in pieces)
 
     return _gather(read, place, most, scan)
 

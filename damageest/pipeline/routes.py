@@ -83,7 +83,7 @@ ACQUIRE: Route = (
     note_scan,  # scan -> +warnings
     crop_scan,  # scan, reader -> scan
     set_far_aside,  # scan, part -> scan, +warnings
-    correct_temperature,  # scan, temperature -> scan, thermal_scale
+    correct_temperature,  # scan, temperature -> scan, thermal_scale, scan_centre
     measure_scan,  # scan, part -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
     set_filled_aside,  # scan -> scan, +warnings
@@ -96,7 +96,7 @@ ACQUIRE: Route = (
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader
-        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale -> scan
+        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale, scan_centre -> scan
         place_scan,  # scan, pose -> aligned, noise, spacing
     ),
     keep_shared,  # scan, aligned, part, tolerance, unit -> scan, aligned, +warnings
@@ -104,7 +104,8 @@ ACQUIRE: Route = (
     #     -> views, pose, aligned, noise, spacing, tolerance, warnings
     hold_datums,  # calls Align: views, pose, aligned, scan, part, tolerance, aligner, warnings, unit, samples
     #     -> pose, aligned, warnings
-    correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader -> scan, pose, aligned, corrected_scale
+    correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader, scan_centre
+    #     -> scan, pose, aligned, corrected_scale
     adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
     #     adapter, scan -> adapted, part, aligned, pose, samples, asked_fit, warnings
     note_datums,  # adapted, aligner, part, tolerance, unit -> +warnings
@@ -179,8 +180,8 @@ CLOSE: Route = (
     cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
     note_unused,  # samples -> +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections
-    #     -> result
+    #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections,
+    #     corrected_scale, thermal_scale, scan_centre -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written

@@ -209,9 +209,9 @@ class JobState(State):
     surface. ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the
     sites. ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written
     into, ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
-    ``thermal_scale``: what the scan was divided by for the part's temperature; ``scanner_errors``: of the whole scan by
-    certificate and temperature; ``budget``: of the total volume. ``sheets``: two surfaces over the same skin;
-    ``explained``: places that views which lie apart explain, no sites.
+    ``thermal_scale``: what the scan was divided by for the part's temperature, about ``scan_centre`` (3,).
+    ``scanner_errors``: of the whole scan by certificate and temperature; ``budget``: of the total volume. ``sheets``:
+    two surfaces over the same skin; ``explained``: places that views which lie apart explain, no sites.
     """
 
     name = Value[str]()
@@ -253,6 +253,7 @@ class JobState(State):
     views = Value[ViewFits | None]()
     corrected_scale = Value[float]()
     thermal_scale = Value[float]()
+    scan_centre = Value[Floats]()
     fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
     facts = Value[ScanFacts]()

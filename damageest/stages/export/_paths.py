@@ -74,14 +74,15 @@ def _list_meshes(path: DepositPath) -> dict[str, Mesh]:
 
 
 def _move_path(path: DepositPath, T: Floats | None) -> DepositPath:
-    """The path moved by a rigid transform (4,4), or into its set-up frame where it has one, as far as writers need
-    it."""
+    """The path moved by a transform (4,4), rigid but for a factor, or into its set-up frame where it has one, as far as
+    writers need it."""
     setup = path.setup
     if setup is not None:
         T, setup = setup, setup if T is None else setup @ np.linalg.inv(T)
     if T is None:
         return path
-    turn = T[:3, :3].T
+    size = float(np.cbrt(np.linalg.det(T[:3, :3])))
+    turn = T[:3, :3].T if abs(size - 1) < 1e-12 else T[:3, :3].T / size
     axes = path.axes @ turn
     if setup is not None:  # without what rounding leaves
         axes = np.where(np.abs(axes - np.round(axes)) < 1e-12, np.round(axes), axes)

@@ -15,7 +15,7 @@ from pydantic import AfterValidator, Field
 from damageest.artefacts import Deposit, Floats, Solid
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.touching import ROUNDS, separate_touching
-from damageest.geometry.transforms import invert_pose, move_mesh, move_points
+from damageest.geometry.transforms import move_mesh, move_points
 from damageest.io.meshes import write_ply
 from damageest.stages import JobPath
 from damageest.stages.export import Body, Export, ExportedFiles, Patch, PathSettings, PathWriter, Writer
@@ -128,7 +128,7 @@ class Files(Export):
             from damageest.stages.export._spline import fit_spline
 
             splines = {site.id: fit_spline(site.surface, result.tolerance) for site in result.sites}
-        places = {place: invert_pose(result.pose) if place == SCAN else None for place in PLACES[self.frame]}
+        places = {place: result.transform_to_scan if place == SCAN else None for place in PLACES[self.frame]}
         bodies = _collect_bodies(result)
         back = map_to_nominal(result, bodies) if NOMINAL in places and result.adapted else None
         done: list[ExportedFiles] = []
@@ -229,7 +229,7 @@ class Files(Export):
             path = _make_folder(folder, f"{place}{group}/site-{site.id}.ply")
             write_ply(path, move_mesh(site.surface, T))
             done.append(ExportedFiles((path.relative_to(folder).as_posix(),)))
-        scan = result.aligned if T is None else result.scan
+        scan = result.aligned if T is None else replace(result.scan, points=result.raw_points)
         done.append(write_scan(result, scan, folder, f"{place}scan.ply", self.point_colours))
         if result.coverage is not None:
             done.append(write_coverage(result.coverage, T, folder, place))
@@ -282,7 +282,7 @@ def _keep_closed(solid: Solid, result: Result, moving: bool = True) -> Solid:
     ``moving``: whether sheets that touch are moved apart. Neighbouring sites in one large solid touch on whole faces,
     which takes long.
     """
-    moved = move_mesh(solid, invert_pose(result.pose))
+    moved = move_mesh(solid, result.transform_to_scan)
     largest = max(float(np.abs(each.bounds).max()) for each in (solid, moved))
     radius = 2 * float(np.spacing(np.float32(largest)))
     return separate_touching(solid, radius, 10 * radius, ROUNDS if moving else 1) or solid

@@ -40,6 +40,8 @@ def result():
         units="mm",
         tolerance=0.1,
         pose=Pose(np.eye(4)),
+        transform_to_scan=np.eye(4),
+        raw_points=points,
         adapted=None,
         scan=Scan(points, truth=Truth(body, np.eye(4))),
         aligned=Scan(points),

@@ -15,6 +15,7 @@ from damageest_evaluate.commands import (
     budget,
     difference,
     honesty,
+    inspections,
     path,
     prepare,
     real,
@@ -35,6 +36,7 @@ app.command("adapt")(adapt.command)
 app.command("budget")(budget.command)
 app.command("difference")(difference.command)
 app.command("honesty")(honesty.command)
+app.command("inspections")(inspections.command)
 app.command("real")(real.command)
 app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)

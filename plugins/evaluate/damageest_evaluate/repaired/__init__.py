@@ -1,0 +1,1 @@
+"""Repaired parts with known faults, as `damageest inspect` judges them."""
