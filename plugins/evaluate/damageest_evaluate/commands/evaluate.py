@@ -14,6 +14,7 @@ from damageest_evaluate.commands import (
     adapt,
     budget,
     difference,
+    family,
     honesty,
     inspections,
     path,
@@ -35,6 +36,7 @@ app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against 
 app.command("adapt")(adapt.command)
 app.command("budget")(budget.command)
 app.command("difference")(difference.command)
+app.command("family")(family.command)
 app.command("honesty")(honesty.command)
 app.command("inspections")(inspections.command)
 app.command("real")(real.command)

@@ -1,0 +1,74 @@
+"""Families of scans drawn at random: the truth of a draw is what its scan shows."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from damageest_evaluate.families.case import FAMILIES, FamilyCase
+from damageest_evaluate.families.report import describe_row, make_family_cases, make_family_table
+from damageest_evaluate.families.scene import Draw
+
+from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.transforms import move_points
+
+
+def measure_off(draw: Draw) -> np.ndarray:
+    """Distance of each point from the part's skin, in the true pose."""
+    assert draw.pose is not None
+    return distance_to_mesh(move_points(draw.scan.points, draw.pose), draw.part)
+
+
+@pytest.mark.parametrize("seed", [0, 12, 15, 24])
+def test_a_wall_is_scanned_where_it_is_left(seed: int) -> None:
+    draw = FAMILIES["walls"][1](seed)
+    assert draw.damage is not None
+    off = measure_off(draw)
+    assert off.max() < draw.depth + 2 * draw.tolerance  # as deep as the pit, with noise
+    wall = float(draw.said["wall"])
+    assert off.max() > 0.7 * min(draw.depth, wall / 2)  # beyond half of the wall its other side is nearer
+    assert 0.15 <= draw.depth / wall <= 0.95
+
+
+def test_a_pit_that_was_scanned_from_behind_was_not_seen() -> None:
+    draw = FAMILIES["walls"][1](16)
+    assert draw.said["side"] == "inside"
+    assert not draw.shown
+    assert measure_off(draw).max() < 2 * draw.tolerance
+
+
+@pytest.mark.parametrize(("seed", "fits"), [(0, True), (7, False)])
+def test_a_mirrored_part_fits_only_after_a_reflection(seed: int, fits: bool) -> None:
+    draw = FAMILIES["hands"][1](seed)
+    assert draw.said["hand"] == ("proper" if fits else "mirrored")
+    assert (draw.pose is not None) == fits
+    if draw.pose is not None:
+        assert measure_off(draw).max() < 2 * draw.tolerance
+
+
+@pytest.mark.parametrize(("seed", "seen"), [(4, True), (11, False)])
+def test_a_feature_tells_the_angle_where_it_was_seen(seed: int, seen: bool) -> None:
+    """Turned by half a turn about its axis, the scan fits the part only if its feature was not seen."""
+    draw = FAMILIES["turned"][1](seed)
+    assert draw.shown == seen
+    assert measure_off(draw).max() < 2 * draw.tolerance
+    lug = draw.part.vertices[np.argmax(np.hypot(*draw.part.vertices[:, :2].T))]
+    assert draw.pose is not None
+    gap = np.linalg.norm(move_points(draw.scan.points, draw.pose) - lug, axis=1).min()
+    assert (gap < 10 * draw.tolerance) == seen
+
+
+def test_equal_seeds_give_equal_scans() -> None:
+    first, second = FAMILIES["hands"][1](3), FAMILIES["hands"][1](3)
+    assert np.array_equal(first.scan.points, second.scan.points)
+    assert not np.array_equal(first.scan.points, FAMILIES["hands"][1](4).scan.points)
+
+
+def test_cases_are_drawn_evenly_and_counted_by_group() -> None:
+    cases = make_family_cases((), 10, (), "source")
+    assert len(cases) == 42
+    assert len({case.compute_key() for case in cases}) == 42
+    rows = [case.make_blank_row() | {"said": {"side": "both"}} for case in cases if case.family == "walls"]
+    rows[0] |= {"outcome": "right", "comes_out": True, "holds": True, "accepted": 1, "sites": 1}
+    table = make_family_table(rows)
+    assert table[1][:6] == ["walls", "all", "30", "29", "30", "1"]
+    assert describe_row(FamilyCase("walls", 3).make_blank_row()).startswith("walls 3: SILENT")
