@@ -13,6 +13,7 @@ from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scanner import ScannerErrors, find_shares
 from damageest.checks.site_error import WIDTH, SiteError
+from damageest.checks.unseen_rim import find_unseen_beside
 from damageest.findings import Coverage
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
@@ -209,15 +210,10 @@ def _limit_outward(scan: ScanFacts, skin_area: float) -> float:
     return scan.outward_height if scan.outward_area > OUTWARD * skin_area else 0.0
 
 
-def limit_beside(coverage: Coverage, damage: Solid, reach: float, depth: float) -> float:
-    """By how much a loss may be larger where skin within ``reach`` of it is not seen: over all of that region, as deep
-    as it is itself, ``depth``."""
-    centres = coverage.skin.triangles.mean(axis=1)
-    low, high = damage.bounds[0] - reach, damage.bounds[1] + reach
-    near = np.flatnonzero((coverage.region >= 0) & ((centres > low) & (centres < high)).all(axis=1))
-    if not len(near):
-        return 0.0
-    touched = np.unique(coverage.region[near[distance_to_mesh(centres[near], damage) < reach]])
+def limit_beside(coverage: Coverage, damage: Solid, inner: Flags, reach: float, depth: float) -> float:
+    """By how much a loss may be larger where skin beside it, within ``reach``, is not seen: over all of that region, as
+    deep as it is itself, ``depth``. ``inner`` (F,): which of its faces are inside the part."""
+    touched = np.unique(coverage.region[find_unseen_beside(coverage, damage, inner, reach)])
     regions = [coverage.unseen[number] for number in touched]
     return float(sum(min(one.volume, one.area * depth) for one in regions))
 

@@ -1,14 +1,22 @@
-"""Where a damage volume ends because the scan ends there: its rim beside skin that the scan does not show."""
+"""Where a damage volume ends because the scan ends there: its rim beside skin that the scan does not show.
+
+Skin is beside a loss where it faces as the lost skin next to it does. The other side of a thin wall is near, and is not
+beside it.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats, Part, Solid
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
 from damageest.checks.inner_surface import pair_faces
 from damageest.findings import Coverage
+from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.skin import find_inner_faces
+
+OPPOSITE = -0.5
+"""Cosine between two normals below which they belong to two sides of a wall."""
 
 
 def measure_unseen_rim(damage: Solid, part: Part, coverage: Coverage, reach: float) -> float:
@@ -16,8 +24,9 @@ def measure_unseen_rim(damage: Solid, part: Part, coverage: Coverage, reach: flo
 
     The rim are the edges between the faces of the damage volume inside the part and those on the skin.
     """
-    unseen = coverage.skin.triangles[coverage.region >= 0].mean(axis=1)
-    start, end = _find_rim(damage, part)
+    inner = find_inner_faces(damage, part)
+    unseen = coverage.skin.triangles[find_unseen_beside(coverage, damage, inner, reach)].mean(axis=1)
+    start, end = _find_rim(damage, inner)
     if not len(unseen) or not len(start):
         return 0.0
     length = np.linalg.norm(end - start, axis=1)
@@ -25,9 +34,22 @@ def measure_unseen_rim(damage: Solid, part: Part, coverage: Coverage, reach: flo
     return float(length[np.isfinite(gap)].sum() / max(float(length.sum()), 1e-300))
 
 
-def _find_rim(damage: Solid, part: Part) -> tuple[Floats, Floats]:
+def find_unseen_beside(coverage: Coverage, damage: Solid, inner: Flags, reach: float) -> Ints:
+    """The unseen cells (M,) of the skin that lie within ``reach`` of the skin that a damage volume removes, and face as
+    it does there. ``inner`` (F,): which faces of ``damage`` are inside the part."""
+    centres = coverage.skin.triangles.mean(axis=1)
+    low, high = damage.bounds[0] - reach, damage.bounds[1] + reach
+    near = np.flatnonzero((coverage.region >= 0) & ((centres > low) & (centres < high)).all(axis=1))
+    if not len(near) or inner.all():
+        return np.empty(0, dtype=np.int64)
+    lost = Mesh(damage.vertices, damage.faces[~inner])
+    distance, face, _ = closest_on_mesh(centres[near], lost)
+    facing = np.einsum("ij,ij->i", coverage.skin.face_normals[near], lost.face_normals[face])
+    return near[(np.abs(distance) < reach) & (facing > OPPOSITE)]
+
+
+def _find_rim(damage: Solid, inner: Flags) -> tuple[Floats, Floats]:
     """The ends (E,3) of the edges that belong to one face inside the part and one on the skin."""
     starts, ends, first, second = pair_faces(damage.faces)
-    inner = find_inner_faces(damage, part)
     rim = inner[first] != inner[second]
     return damage.vertices[starts[rim]], damage.vertices[ends[rim]]

@@ -164,7 +164,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     error = replace(
         found,
         less=found.less + (site.damage.volume if bent_wall else 0.0),
-        beside=limit_beside(state.coverage, site.damage, reach, found.depth),
+        beside=limit_beside(state.coverage, site.damage, inner, reach, found.depth),
         fading=fading.beyond if fading else 0.0,
         rates=np.append(found.rates, [one.rate for one in dependences]),
         motions=np.concatenate([found.motions, *([[one.motion.low, one.motion.high]] for one in dependences)]),
