@@ -18,7 +18,7 @@ from damageest.pipeline.steps import Step
 from damageest.registry.hookspecs import hookimpl
 from damageest.result import SoFar
 
-POLL = 0.05
+POLL = 0.02
 """Seconds between two looks at whether the caller has cancelled."""
 AGAIN = 0.5
 """Seconds after which a run that goes on is interrupted again: code of a library may have swallowed it."""
@@ -95,6 +95,55 @@ class _Stop(KeyboardInterrupt):
     """What is raised in the thread of a run that is cancelled: all code of damageest treats it as Ctrl-C."""
 
 
+class _Watcher:
+    """Looks at a signal in a thread of its own, and interrupts the thread that made it once the signal is set."""
+
+    def __init__(self, signal: Signal) -> None:
+        self._signal, self._target = signal, threading.get_ident()
+        self._over = self._sent = self._ended = False
+        self._thread = threading.Thread(target=self._watch, name="damageest cancel", daemon=True)
+
+    def start(self) -> None:
+        """Begins the watch; what it interrupts has to be ready for it."""
+        self._thread.start()
+
+    def _watch(self) -> None:
+        later = 0.0
+        try:
+            while not self._over:
+                time.sleep(POLL)
+                if self._signal.is_set() and time.monotonic() > later and not self._over:
+                    self._sent, later = True, time.monotonic() + AGAIN
+                    self._interrupt()
+        finally:
+            self._ended = True
+
+    def _interrupt(self) -> None:
+        """It is raised at the next instruction of Python code there, in place of one that still waits for it."""
+        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(self._target), ctypes.py_object(_Stop))
+
+    def end(self) -> None:
+        """Ends the watch. No interrupt comes after it.
+
+        An interrupt that still waits to be raised is raised here. To take it back by a null pointer would leave the
+        interpreter looking for it at each instruction, for ever, and Python 3.11 never leaves a function that it traces
+        then (under coverage, or in a debugger).
+        """
+        while True:
+            try:
+                self._over = True
+                while not self._ended:
+                    time.sleep(POLL / 10)
+                if not self._sent:
+                    break
+                self._sent = False
+                self._interrupt()
+                time.sleep(POLL)
+            except _Stop:
+                continue
+        self._thread.join()
+
+
 @contextmanager
 def cancel_with(signal: Signal | None) -> Iterator[None]:
     """Ends what runs in the ``with`` block, in this thread, soon after ``signal`` is set: as Ctrl-C would, so that its
@@ -102,32 +151,20 @@ def cancel_with(signal: Signal | None) -> Iterator[None]:
     if signal is None:
         yield
         return
-    thread, over = threading.get_ident(), threading.Event()
-    guard = threading.Lock()
-
-    def watch() -> None:
-        while not over.wait(POLL):
-            if signal.is_set():
-                with guard:
-                    if not over.is_set():
-                        ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), ctypes.py_object(_Stop))
-                over.wait(AGAIN)
-
-    watcher = threading.Thread(target=watch, name="damageest cancel", daemon=True)
     if signal.is_set():
         raise CancelledError
-    watcher.start()
+    watcher = _Watcher(signal)
     try:
-        yield
+        try:
+            watcher.start()
+            yield
+        finally:
+            watcher.end()
     except KeyboardInterrupt as error:
+        watcher.end()  # again, where the interrupt came before the first one had begun
         if not signal.is_set():
             raise
         raise CancelledError from error
-    finally:
-        with guard:
-            over.set()
-            ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread), None)
-        watcher.join()
 
 
 @contextmanager
