@@ -45,7 +45,7 @@ def find_unseen_beside(coverage: Coverage, damage: Solid, inner: Flags, reach: f
     lost = Mesh(damage.vertices, damage.faces[~inner])
     distance, face, _ = closest_on_mesh(centres[near], lost)
     facing = np.einsum("ij,ij->i", coverage.skin.face_normals[near], lost.face_normals[face])
-    return near[(np.abs(distance) < reach) & (facing > OPPOSITE)]
+    return np.asarray(near[(np.abs(distance) < reach) & (facing > OPPOSITE)])
 
 
 def _find_rim(damage: Solid, inner: Flags) -> tuple[Floats, Floats]:

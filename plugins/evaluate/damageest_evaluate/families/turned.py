@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Floats, Mesh, Scan
+from damageest.artefacts import Flags, Floats, Mesh, Scan
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_arrays, to_solid
@@ -100,7 +100,7 @@ def draw_turned(seed: int) -> Draw:
     return Draw(part, scan, damage, pose, 4 * noise, shown=seen, said=said)
 
 
-def _is_of_feature(points: Floats, plain: Any, body: Any, noise: float) -> Floats:
+def _is_of_feature(points: Floats, plain: Any, body: Any, noise: float) -> Flags:
     """Whether each point is nearer than six noises to what the feature adds or takes away."""
     changed = Mesh(*to_arrays((plain - body) + (body - plain)))
     return np.asarray(distance_to_mesh(points, changed) < 6 * noise)

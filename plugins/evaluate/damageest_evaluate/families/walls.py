@@ -233,7 +233,7 @@ def draw_wall(seed: int) -> Draw:
     pose = np.eye(4)
     if not known:
         scan, pose = move_out(scan, draw_motion(rng, part.diagonal))
-    said = {
+    said: dict[str, str | float] = {
         "body": body,
         "pit": pit,
         "side": side,
