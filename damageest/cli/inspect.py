@@ -48,6 +48,13 @@ def command(
         ElsewhereName | None,
         typer.Option("--elsewhere", help="Whether findings at no site decide on the part; default: as the job says."),
     ] = None,
+    scan_unit: Annotated[
+        str | None, typer.Option("--scan-unit", help="Unit of the scan's file; default: that of the job's scan.")
+    ] = None,
+    part_temperature: Annotated[
+        float | None,
+        typer.Option("--part-temperature", help="Of the part at this scan, in °C; default: as in the job."),
+    ] = None,
     fixture: Annotated[
         list[str] | None,
         typer.Option(
@@ -59,6 +66,7 @@ def command(
 ) -> None:
     """Say what is missing and what is over after a step of a repair, and add it to the record in OUT."""
     asked: dict[str, Any] = {"tolerance": tolerance, "same_setup": same_setup, "defect": defect}
+    asked |= {"scan_unit": scan_unit, "part_temperature": part_temperature}
     if elsewhere is not None:
         asked["elsewhere"] = elsewhere.value
     end_with(lambda: _inspect(folder, scan, step.value, asked, fixture or [], as_json), as_json)

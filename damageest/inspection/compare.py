@@ -15,6 +15,7 @@ import numpy as np
 
 from damageest.api import run
 from damageest.artefacts import Flags
+from damageest.errors import InputError
 from damageest.inspection.aim import Aim
 from damageest.inspection.findings import Finding, list_findings
 from damageest.inspection.joined import find_bodies, keep_joined, list_joined
@@ -37,6 +38,7 @@ class Question:
     moved between the scans, and has the pose of the first one. ``defect``: width of the least defect that matters;
     None: `DEFECT` tolerances. ``elsewhere``: whether what is found at no site decides on the part, or is only listed.
     ``fixtures``: boxes in the part's frame, with ``min`` and ``max``, in which points are no part's.
+    ``scan_unit``: of the file; None: as in the job. ``part_temperature``: at this scan, in °C; None: as in the job.
     """
 
     tolerance: float | None = None
@@ -44,6 +46,8 @@ class Question:
     defect: float | None = None
     elsewhere: Literal["decides", "listed"] = "decides"
     fixtures: tuple[Mapping[str, Any], ...] = ()
+    scan_unit: str | None = None
+    part_temperature: float | None = None
 
 
 @dataclass(frozen=True)
@@ -66,8 +70,12 @@ class Inspection:
 def ask(aim: Aim, asked: Mapping[str, Any]) -> Question:
     """What is asked: by the job of the run before, and before that by ``asked``, without what is None."""
     of_job = aim.folder.content["provenance"]["job"].get("inspect") or {}
+    told: dict[str, Any] = {**of_job, **_leave_out_none(asked)}
     known = {field.name for field in fields(Question)}
-    return Question(**{name: value for name, value in {**of_job, **_leave_out_none(asked)}.items() if name in known})
+    taken: dict[str, Any] = {
+        name: tuple(value) if isinstance(value, list) else value for name, value in told.items() if name in known
+    }
+    return Question(**taken)
 
 
 def _leave_out_none(values: Mapping[str, Any]) -> dict[str, Any]:
@@ -85,7 +93,8 @@ def inspect_step(aim: Aim, scan: Path, question: Question = Question()) -> Inspe
     align, pose = _choose_pose(content, question.same_setup)
     job: dict[str, Any] = {
         "version": 1, "name": content["name"], "units": aim.folder.unit, "tolerance": allowed, "align": align,
-        "adapt": "none", "accept": "all", "scan": {"use": "file", "path": str(scan.absolute())}, "report": "none",
+        "adapt": "none", "accept": "all", "scan": _choose_reading(content, scan, question), "report": "none",
+        **_choose_temperature(content, question),
     }  # fmt: skip
     result = run(job, part=aim.target)
     places = {number: cut_places(aim.target, body, OWN * allowed, defect) for number, body in aim.deposits.items()}
@@ -117,6 +126,31 @@ def _find_fixed(result: Result, fixtures: tuple[Mapping[str, Any], ...]) -> Flag
     for box in fixtures:
         inside |= ((points >= np.array(box["min"])) & (points <= np.array(box["max"]))).all(axis=1)
     return inside
+
+
+def _choose_reading(content: Mapping[str, Any], scan: Path, question: Question) -> dict[str, Any]:
+    """The options of `scan`: the file is read as that of the job was."""
+    asked = content["provenance"]["job"].get("scan")
+    asked = asked if isinstance(asked, Mapping) and asked.get("use", "file") == "file" else {}
+    reading = {"use": "file", "path": str(scan.absolute())}
+    crops = ["crop"] if question.same_setup else []  # they are in the frame of the scanner
+    kept = ["unit", "columns", "min_confidence", *crops]
+    reading |= {name: asked[name] for name in kept if asked.get(name)}
+    if question.scan_unit:
+        reading["unit"] = question.scan_unit
+    return reading
+
+
+def _choose_temperature(content: Mapping[str, Any], question: Question) -> dict[str, Any]:
+    """The option `temperature`, where the job has one. Raises InputError for a temperature without an expansion."""
+    asked = content["provenance"]["job"].get("temperature")
+    if asked is None:
+        if question.part_temperature is not None:
+            raise InputError("--part-temperature: the job has no  temperature  with the expansion of the material")
+        return {}
+    if question.part_temperature is not None:
+        asked = {**asked, "part": question.part_temperature}
+    return {"temperature": dict(asked)}
 
 
 def _choose_pose(content: Mapping[str, Any], same_setup: bool) -> tuple[Any, str]:

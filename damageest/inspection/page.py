@@ -31,7 +31,7 @@ def describe(record: Mapping[str, Any]) -> str:
         f"<h1>{_show(record['name'])}: repair record</h1>",
         f"<h2>Workpiece</h2><p>{_show(Path(record['workpiece']['part']['path']).name or 'given as arrays')}<br>"
         f"<code>sha256 {_show(record['workpiece']['part']['sha256'])}</code></p>",
-        f"<h2>Inspection before</h2><p>Damage volume {_number(before['damage_volume'])} {unit}³, tolerance "
+        f"<h2>Inspection before</h2><p>{_describe_lost(before, unit)}, tolerance "
         f"{_number(before['tolerance'])} {unit}</p>",
         _table(
             ["site", "verdict", "repaired", f"volume, {unit}³", f"depth, {unit}"],
@@ -76,6 +76,13 @@ def _describe_entry(entry: Mapping[str, Any], unit: str) -> str:
         f"(rms). Tolerance {_number(entry['tolerance'])} {unit}.</p>{verdicts}{findings}"
         + "".join(f"<p class='note'>{_show(note)}</p>" for note in entry["notes"])
     )
+
+
+def _describe_lost(before: Mapping[str, Any], unit: str) -> str:
+    """Lost metal, and the cavity where a cut-back enlarged it."""
+    whole, lost = before["damage_volume"], before.get("lost_volume", before["damage_volume"])
+    told = f"Lost metal {_number(lost)} {unit}³"
+    return told if lost == whole else f"{told}, cavity with the cut-back {_number(whole)} {unit}³"
 
 
 def _describe_shown(one: Mapping[str, Any], unit: str) -> str:

@@ -35,6 +35,7 @@ def begin_record(aim: Aim) -> dict[str, Any]:
             "verdict": site["verdict"]["level"],
             "repaired": site["id"] in aim.deposits,
             "volume": site["volume"],
+            "cut_back_in_it": _find_cut_back(aim, site),
             "volume_95": site["volume_95"],
             "depth": site["max_depth"],
         }
@@ -61,6 +62,7 @@ def begin_record(aim: Aim) -> dict[str, Any]:
             "tolerance": content["tolerance"],
             "pose": {key: content["alignment"][key] for key in ("transform", "rms", "datums", "held")},
             "damage_volume": content["damage_volume"],
+            "lost_volume": max(content["damage_volume"] - sum(one["cut_back_in_it"] for one in sites), 0.0),
             "volume_95": content["volume_95"],
             "sites": sites,
             "versions": content["versions"],
@@ -74,6 +76,13 @@ def begin_record(aim: Aim) -> dict[str, Any]:
         "inspections": [],
         "sha256": "",
     }
+
+
+def _find_cut_back(aim: Aim, site: Mapping[str, Any]) -> float:
+    """Volume of intact metal in a site's damage volume: of the cut-back, where that enlarged it. What is milled off by
+    `prepare` is in a solid of its own."""
+    cut = float((site.get("deposit") or {}).get("cut_back_volume") or 0.0)
+    return cut if site["accepted"] and cut and aim.folder.read_solid("milled", site["id"]) is None else 0.0
 
 
 def describe_inspection(aim: Aim, found: Inspection, scan: Path, time: datetime, previous: str) -> dict[str, Any]:

@@ -24,6 +24,7 @@ from damageest.geometry.distance import signed_distance
 from damageest.geometry.far_points import find_far
 from damageest.geometry.filled import find_filled
 from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.geometry.pieces_of_part import is_piece
 from damageest.geometry.units import diagnose_scale, diagnose_size, question_size
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache
@@ -34,6 +35,7 @@ from damageest.pipeline.steps import step
 from damageest.pipeline.workspace import is_in_use
 from damageest.registry.registry import Registry
 from damageest.rules.notes import make_notes
+from damageest.stages.align import Align
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
@@ -96,9 +98,12 @@ def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
 
 
 @step(gives=("noise", "spacing", "depth_step"), kept=True)
-def measure_scan(scan: Scan, part: Part) -> tuple[float, float, float]:
-    """Measures noise and spacing of the scan, and the step of its depth. Raises InputError for one of another size."""
-    if wrong_size := diagnose_scale(scan.points, part.vertices, part.unit):
+def measure_scan(scan: Scan, part: Part, aligner: Align | None) -> tuple[float, float, float]:
+    """Measures noise and spacing of the scan, and the step of its depth. Raises InputError for one of another size, but
+    for a piece of the part in a known pose."""
+    wrong_size = diagnose_scale(scan.points, part.vertices, part.unit)
+    known = None if aligner is None else aligner.known_pose
+    if wrong_size and not (known is not None and is_piece(scan.points, part, known)):
         raise InputError(f"scan: {wrong_size}{say_columns(scan)}", topic="unit")
     return (scan.noise, scan.spacing, 0.0) if scan.noise else _measure(scan)
 

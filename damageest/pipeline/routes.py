@@ -84,7 +84,7 @@ ACQUIRE: Route = (
     crop_scan,  # scan, reader -> scan
     set_far_aside,  # scan, part -> scan, +warnings
     correct_temperature,  # scan, temperature -> scan, thermal_scale, scan_centre
-    measure_scan,  # scan, part -> noise, spacing, depth_step
+    measure_scan,  # scan, part, aligner -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
     set_filled_aside,  # scan -> scan, +warnings
     where_taken(  # samples

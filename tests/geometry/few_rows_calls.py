@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from damageest.artefacts import DisplacementField, Samples, Sites
+from damageest.artefacts import DisplacementField, Part, Samples, Sites
 from damageest.geometry import (
     barycentric,
     bodies,
@@ -34,6 +34,7 @@ from damageest.geometry import (
     open_surfaces,
     orientation,
     pieces,
+    pieces_of_part,
     point_pieces,
     poisson,
     polygons,
@@ -263,6 +264,9 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "orientation.find_signs": lambda r: expect(orientation.find_signs(r.points, r.points, r.points[:, 0]), (r.count,)),
     "pieces.find_pieces": lambda r: expect(np.asarray(pieces.find_pieces(CUBE, r.points, r.numbers, 0.5)[1]), ()),
     "pieces.join_pieces": call_join_pieces,
+    "pieces_of_part.is_piece": lambda r: (
+        pieces_of_part.is_piece(r.points, Part(CUBE.vertices, CUBE.faces), np.eye(4)) and None
+    ),
     "point_pieces.number_pieces": lambda r: expect(point_pieces.number_pieces(r.points, 1.0), (r.count,)),
     "poisson.Grid": call_grid,
     "poisson.solve_poisson": call_poisson(poisson.solve_poisson),

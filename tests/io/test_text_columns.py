@@ -74,7 +74,7 @@ def choose(lines: list[str], folder: Path) -> tuple[Scan, str]:
     cube = box(60.0)
     part = Part(cube.vertices, cube.faces)
     scan = choose_columns(reader.run(unit="mm"), part, reader, "mm")
-    measure_scan(scan, part)
+    measure_scan(scan, part, None)
     return scan, " ".join(map(str, scan.warnings))
 
 

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from damageest.artefacts import Part, Pose, Samples, Scan
+from damageest.artefacts import Floats, Part, Pose, Samples, Scan
 from damageest.geometry.selectors import Selector
 from damageest.stages import Stage, asked_by_name
 
@@ -63,6 +63,11 @@ class Align(Stage, ABC):
     def moves_views(self) -> bool:
         """Whether views of the scan that lie off the others are to be put right after it."""
         return False
+
+    @property
+    def known_pose(self) -> Floats | None:
+        """(4,4) the pose that is known before the scan is read; None where it is found."""
+        return None
 
     @property
     def datums(self) -> Any:

@@ -47,7 +47,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
     inside the part, and in the pose nearby as well. A correction that moves the part's surface by less than the
     tolerance is not counted either.
     """
-    frame = Frame.build(scan, part)
+    frame = Frame.build(scan, part, T)
     noise, band = scan.noise / frame.size, tolerance / frame.size
     rng = np.random.default_rng(0)
     dense, weights, oriented = orient_scan(frame.scale_points(scan), scan.normals, noise, 100, rng)

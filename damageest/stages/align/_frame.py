@@ -44,8 +44,12 @@ class Frame:
     middle: Floats
 
     @classmethod
-    def build(cls, scan: Scan, part: Part) -> Frame:
-        """Raises StageError for a scan of too few or non-finite points, or of a size that cannot be the part's."""
+    def build(cls, scan: Scan, part: Part, known: Floats | None = None) -> Frame:
+        """``known``: the pose (4,4), where the scan may show a piece of the part.
+
+        Raises StageError for a scan of too few or non-finite points, or of a size that cannot be the part's.
+        """
+        from damageest.geometry.pieces_of_part import is_piece
         from damageest.geometry.units import diagnose_scale
 
         if len(scan.points) < MIN_POINTS:
@@ -56,7 +60,8 @@ class Frame:
             )
         if not np.isfinite(scan.points).all():
             raise StageError("the scan has points that are not finite", "remove these points from the file")
-        if wrong := diagnose_scale(scan.points, part.vertices, part.unit):
+        wrong = diagnose_scale(scan.points, part.vertices, part.unit)
+        if wrong and not (known is not None and is_piece(scan.points, part, known)):
             raise StageError(wrong, "set the unit of scan or part, or crop the scan to the part", topic="unit")
         size, centre = part.diagonal, part.bounds.mean(0)
         middle = np.median(scan.points[:: max(1, len(scan.points) // 100_000)], axis=0)

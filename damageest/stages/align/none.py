@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from pydantic import Field as Option
 
-from damageest.artefacts import Part, Pose, Scan
+from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align import Align
@@ -29,6 +29,10 @@ class KnownPose(Align):
         "identity",
     )
 
+    @property
+    def known_pose(self) -> Floats:
+        return np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
+
     def run(self, scan: Scan, part: Part, tolerance: float) -> Pose:
         """The given pose; its inliers are the scan points within the tolerance of the part, of about 100,000 at
         most. Raises StageError where the scan contradicts it."""
@@ -36,7 +40,7 @@ class KnownPose(Align):
         from damageest.stages.align._field import PartSurface
         from damageest.stages.align._frame import MIN_POINTS
 
-        T = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
+        T = self.known_pose
         if not len(scan.points):
             return Pose(T, inliers=0.0, notes=("the scan has no points",))
         if not np.isfinite(scan.points).all():
