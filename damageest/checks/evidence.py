@@ -21,6 +21,7 @@ from damageest.artefacts import (
     Scan,
     Solid,
 )
+from damageest.checks.unseen_rim import face_alike
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.point_pieces import number_pieces
@@ -80,7 +81,7 @@ def weigh_evidence(
         asked = on_skin[_measure_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
         contradicted = 1 - _share_far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
     covered = _find_covered(aligned, deviation, part, low, high, reach)
-    unseen = _share_unseen(part, damage, np.concatenate([points, covered]), on_skin, reach)
+    unseen = _share_unseen(part, damage, inner, np.concatenate([points, covered]), on_skin, reach)
     over = _count_intact_over(damage, inner, part, aligned, deviation, tolerance)
     # as many as on intact skin of this area, or as many as there are points of the site: either shows intact skin
     skin_area = float(np.linalg.norm(damage.cross[~inner], axis=1).sum() / 2)
@@ -156,8 +157,8 @@ def _find_covered(aligned: Scan, deviation: Deviation, part: Part, low: Floats, 
     return closest_on_mesh(above[pick_one_per_cube(above, 0.5 * reach)], part).place if len(above) else above
 
 
-def _share_unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, reach: float) -> float:
-    """Share of the part's skin just outside the DV that has no scan point."""
+def _share_unseen(part: Part, damage: Solid, inner: Flags, points: Floats, on_skin: Floats, reach: float) -> float:
+    """Share of the part's skin beside the DV that has no scan point. The other side of a thin wall is not beside it."""
     if not len(on_skin):
         return 0.0
     low, high = damage.bounds[0] - 6 * reach, damage.bounds[1] + 6 * reach
@@ -165,12 +166,17 @@ def _share_unseen(part: Part, damage: Solid, points: Floats, on_skin: Floats, re
     for along, least, most in zip(part.vertices.T, low, high, strict=True):
         near &= (along < most)[part.faces].any(axis=1) & (along > least)[part.faces].any(axis=1)
     count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.7 * reach) ** 2, 1000, 2 * MOST))
-    skin = _spread(part, near, count)
-    skin = skin[_measure_gap(skin, on_skin, 6 * reach) < 6 * reach]
+    if not (np.linalg.norm(part.cross[near], axis=1).sum() > 0):
+        return 0.0
+    skin, face = sample_by_area(part, count, np.random.default_rng(0), np.flatnonzero(near))
+    close = _measure_gap(skin, on_skin, 6 * reach) < 6 * reach
+    skin, face = skin[close], face[close]
     if not len(skin):
         return 0.0
     away = distance_to_mesh(skin, damage)
-    ring = skin[(away > 2 * reach) & (away < 6 * reach)]
+    in_ring = (away > 2 * reach) & (away < 6 * reach)
+    ring = skin[in_ring]
+    ring = ring[face_alike(ring, part.face_normals[face[in_ring]], damage, inner)]
     return _share_far(ring, points, 2 * reach) if len(ring) > 20 else 0.0
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
 from damageest.checks.inner_surface import pair_faces
 from damageest.findings import Coverage
-from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.skin import find_inner_faces
 
@@ -42,10 +42,18 @@ def find_unseen_beside(coverage: Coverage, damage: Solid, inner: Flags, reach: f
     near = np.flatnonzero((coverage.region >= 0) & ((centres > low) & (centres < high)).all(axis=1))
     if not len(near) or inner.all():
         return np.empty(0, dtype=np.int64)
+    near = near[distance_to_mesh(centres[near], Mesh(damage.vertices, damage.faces[~inner])) < reach]
+    return np.asarray(near[face_alike(centres[near], coverage.skin.face_normals[near], damage, inner)])
+
+
+def face_alike(places: Floats, normals: Floats, damage: Solid, inner: Flags) -> Flags:
+    """Which places (N,3) of the skin, of outward ``normals`` (N,3), are on the same side of a wall as a damage volume:
+    they face as the nearest skin that it removes. ``inner`` (F,): which of its faces are inside the part."""
+    if inner.all() or not len(places):
+        return np.zeros(len(places), bool)
     lost = Mesh(damage.vertices, damage.faces[~inner])
-    distance, face, _ = closest_on_mesh(centres[near], lost)
-    facing = np.einsum("ij,ij->i", coverage.skin.face_normals[near], lost.face_normals[face])
-    return np.asarray(near[(np.abs(distance) < reach) & (facing > OPPOSITE)])
+    _, face, _ = closest_on_mesh(places, lost)
+    return np.asarray(np.einsum("ij,ij->i", normals, lost.face_normals[face]) > OPPOSITE)
 
 
 def _find_rim(damage: Solid, inner: Flags) -> tuple[Floats, Floats]:

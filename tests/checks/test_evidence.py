@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from damageest.artefacts import Evidence, Solid
+from damageest.artefacts import DAMAGE, INTACT, Deviation, Evidence, Part, Scan, Solid
 from damageest.checks.evidence import weigh_evidence
+from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.solids import iou, to_manifold, to_solid
 from tests.scenes import TOOLS, Scene, scene
 
@@ -64,3 +66,23 @@ def test_damage_that_goes_on_where_nothing_was_seen_is_doubted() -> None:
     found = evidence(blind, case.truth)
     assert found.skin_unseen > 0.9
     assert not found.consistent
+
+
+@pytest.mark.parametrize(("least_x", "is_seen"), [(-20.0, True), (3.0, False)])
+def test_the_other_side_of_a_thin_wall_is_not_beside_a_pit(least_x: float, is_seen: bool) -> None:
+    """A pit 8 mm wide in a plate of 1.5 mm, scanned from above: all of its top, or only what is beyond ``least_x``."""
+    part = to_solid(Manifold.cube((40, 40, 1.5), True).translate((0, 0, -0.75)))
+    damage = to_solid(Manifold.cube((8, 8, 0.6), True).translate((0, 0, -0.3)))
+    assert part is not None
+    assert damage is not None
+    points = np.random.default_rng(0).uniform(-20, 20, (6000, 3)) * [1, 1, 0]
+    in_pit = np.abs(points[:, :2]).max(axis=1) < 4
+    points[in_pit, 2] = -0.6
+    points = points[in_pit | (points[:, 0] > least_x)]
+    in_pit = points[:, 2] < 0
+    deviation = Deviation(points[:, 2].copy(), np.zeros(len(points), int), np.where(in_pit, DAMAGE, INTACT))
+    plate = Part(part.vertices, part.faces)
+    deviation = replace(deviation, face=closest_on_mesh(points * [1, 1, 0], plate).face)
+    found = weigh_evidence(damage, points[in_pit], Scan(points, noise=0.01, spacing=0.5), deviation, plate, 0.15)
+    assert (found.skin_unseen < 0.02) == is_seen
+    assert (found.skin_unseen > 0.25) != is_seen

@@ -18,6 +18,9 @@ THIN = 4.0
 """Thickest wall that is thin, in point spacings."""
 BELOW = 0.5
 """Sine of the angle below the damaged surface from which skin lies behind it, and of that by which it faces away."""
+STRAIGHT = 0.8
+"""Sine from which skin lies straight below the damaged surface and faces straight away from it, in a wall of any
+thickness."""
 FIT_COUNT = 24
 LEAST_SHARE = 0.1
 """Share of the skin beside a site that no point shows, which has to be behind for any to be."""
@@ -57,20 +60,23 @@ def find_behind(
     rim = rim[pick_one_per_cube(aligned.points[rim], 0.5 * cell)] if len(rim) else rim
     if len(rim) < FEWEST:
         return behind
-    thin = pick_one_per_cube(damaged, 0.5 * cell)
-    own = damaged[thin]
+    few = pick_one_per_cube(damaged, 0.5 * cell)
+    own = damaged[few]
     points = np.concatenate([own, aligned.points[rim]])
     points, normals, _ = smooth_points(points, aligned.noise, min(FIT_COUNT, len(points) // 2))
     outward = part.face_normals[deviation.face[rim]]
     evidence = np.concatenate([np.zeros(len(own)), np.einsum("ij,ij->i", normals[len(own) :], outward)])
     normals *= find_signs(points, normals, evidence)[:, None]
     distance, near = find_neighbours(skin.points[asked], 1, points[: len(own)])
-    out, site = normals[near[:, 0]], label[thin][near[:, 0]]
-    height = np.einsum("ij,ij->i", skin.points[asked] - points[near[:, 0]], out)
-    is_behind = (height < -BELOW * distance[:, 0]) & (np.einsum("ij,ij->i", skin.normals[asked], out) < -BELOW)
-    is_behind[is_behind] = (
-        _measure_walls(part, skin.points[asked[is_behind]], skin.normals[asked[is_behind]]) < THIN * aligned.spacing
-    )
+    out, site = normals[near[:, 0]], label[few][near[:, 0]]
+    height = np.einsum("ij,ij->i", skin.points[asked] - points[near[:, 0]], out) / np.maximum(distance[:, 0], 1e-300)
+    facing = np.einsum("ij,ij->i", skin.normals[asked], out)
+    is_behind = (height < -BELOW) & (facing < -BELOW)
+    thin = THIN * aligned.spacing
+    # Of a wall that is thick, what a deep pit has left may be thin: there the far skin is straight below the pit.
+    is_left = (distance[:, 0] < thin) & (height < -STRAIGHT) & (facing < -STRAIGHT)
+    doubted = np.flatnonzero(is_behind & ~is_left)
+    is_behind[doubted] = _measure_walls(part, skin.points[asked[doubted]], skin.normals[asked[doubted]]) < thin
     # The far skin is about as large as the lost one. Fewer are places where the normals are wrong.
     share = np.bincount(site, is_behind) / np.maximum(np.bincount(site), 1)
     behind[asked] = is_behind & (share[site] > LEAST_SHARE)

@@ -78,6 +78,12 @@ def test_the_far_skin_is_behind_and_the_lost_one_is_not(wall: float, deep: float
     assert not ask_behind(part, points, far, rim=False).any(), "without a rim nothing shows the side"
 
 
+def test_the_far_skin_is_behind_what_a_deep_pit_leaves_of_a_thick_wall() -> None:
+    rng = np.random.default_rng(0)
+    far = np.concatenate([rng.uniform(-2, 2, (400, 2)), np.full((400, 1), -6.0)], axis=1)
+    assert ask_behind(plate(6.0), scan_top(5.0), far).mean() > 0.95, "1 of 6 mm is left, a little more than a spacing"
+
+
 def test_skin_below_a_thick_wall_and_little_skin_are_never_behind() -> None:
     points = scan_top(1.2)
     flat = points * [1, 1, 0]
