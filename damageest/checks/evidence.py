@@ -50,7 +50,7 @@ def weigh_evidence(
     """
     spacing = aligned.spacing
     reach = max(2.0 * tolerance, 1.5 * spacing)
-    low, high = damage.bounds[0] - 4 * reach, damage.bounds[1] + 4 * reach
+    low, high = damage.bounds[0] - 8 * reach, damage.bounds[1] + 8 * reach  # all that shows the skin beside it
     here = find_in_box(aligned.points, low, high)
     points, label = aligned.points[here], deviation.label[here]
     ids = ids_points[:: max(1, len(ids_points) // (MOST // 4))]
