@@ -195,6 +195,7 @@ def test_the_pose_has_to_be_right_up_to_listed_symmetries() -> None:
 
 def test_without_a_right_pose_only_doubt_is_said() -> None:
     assert _judge(_make_result(), None, pose=None).outcome == "silent"
+    assert _judge(_make_result(volume_95=None), None, pose=None).outcome == "said"
     assert _judge(_make_result(_make_site(FALSE, False)), None, pose=None).outcome == "said"
     assert _judge(_make_result(_make_site(FALSE, False), _make_site(DENT)), None, pose=None).outcome == "silent"
 

@@ -112,7 +112,8 @@ def judge(result: Result, true: TrueState) -> Judgement:
     faults += find_faults(accepted, seen, unseen, true.part, tolerance)
     value = _compare(accepted, seen, true.part, tolerance)[0]
     if motion is None:
-        outcome: Outcome = "silent" if accepted or (not doubtful and not lost) else "said"
+        open_end = result.volume_95 is None
+        outcome: Outcome = "silent" if accepted or not (doubtful or lost or open_end) else "said"
         return Judgement(outcome, "; ".join(faults), value, len(unseen))
     groups = find_groups(result, bodies)
     if not faults:
