@@ -7,8 +7,14 @@ import numpy as np
 from damageest.artefacts.sections import SectionContour, SectionValue
 from damageest.sections.circle import Circle, find_round, fit_circle
 from damageest.sections.contour import Loop, fit_stations
-from damageest.sections.cut import Cut, sum_errors
+from damageest.sections.cut import FORM_WAVE, Cut, sum_errors
 
+GROOVE = 6.0
+"""Distance from the circle, in robust standard deviations of the stations, from which a part of the outline is a groove
+or a burr: the circle leaves it out. What is nearer is form, and counts."""
+HIDDEN = 2.5
+"""Mean form of the arc that the scan does not show, in standard deviations of the form that it shows."""
+LEAST_SQUARES = "of the least-squares circle (GG of ISO 14405-1)"
 MOST_BORES = 4
 """Circles inside the outer one whose values are listed; of the others the deviation is."""
 UPR = 15.0
@@ -61,18 +67,19 @@ def _measure_circle(
         nothing = [2 * nominal.radius, 0.0, 0.0, 0.0]
         return [SectionValue(name, value, None, note=why) for name, value in zip(names, nothing, strict=True)], []
     seen = "" if shown > 6.1 else f"from the {np.degrees(shown):.0f} degrees that the scan shows"
+    meant = f"{LEAST_SQUARES}, {seen}" if seen else LEAST_SQUARES
     error = sum_errors(contour.error[known], 0.0)
-    plain = fit_circle(places)
-    assert plain is not None
-    left = plain.measure(places)  # lobes are form, and count; a groove is none
-    middle = 1.4826 * float(np.median(np.abs(left - np.median(left))))
-    circle = fit_circle(places, 2 * max(middle, float(np.median(error)), 0.1 * cut.noise, 1e-9))
-    assert circle is not None
+    circle, form = _fit_without_grooves(places, max(float(np.median(error)), 0.1 * cut.noise, 1e-9))
     # one station is as good as its points; neighbouring ones share them, and errors of the sensor
     apart = float(np.median(np.diff(loop.lengths)))
     shared = max(2 * cut.half / apart, 1.0)
     variance = float(np.median(error)) ** 2 * shared + cut.correlated**2 * max(cut.alike / apart, 1.0)
+    # form that the scan does not show: in pieces as long as a wave of it, and as one; facets, not the round surface
+    unseen = max(1.0 - shown / (2 * np.pi), 0.0)
+    variance += form**2 * unseen * max(FORM_WAVE * loop.length / apart, 1.0)
+    sagitta = _measure_sagitta(cut.outlines[number], nominal)
     spread = circle.covariance * variance
+    spread[2, 2] += sagitta**2 / 3 + (HIDDEN * unseen * form) ** 2
     off = circle.centre - nominal.centre
     distance = float(np.linalg.norm(off))
     way = off / distance if distance > 0 else np.array([1.0, 0.0])
@@ -83,7 +90,7 @@ def _measure_circle(
     own[own] = on_circle[station[own]] & on_circle[(station[own] + 1) % len(on_circle)]
     waves = [_smooth(cut, loop, own, around, half) for around in (nominal, circle)]
     values = [
-        SectionValue(names[0], 2 * nominal.radius, 2 * circle.radius, 2 * float(np.sqrt(spread[2, 2])), note=seen),
+        SectionValue(names[0], 2 * nominal.radius, 2 * circle.radius, 2 * float(np.sqrt(spread[2, 2])), note=meant),
         SectionValue(names[1], 0.0, distance, centre_error, note=seen),
     ]
     for name, (wave, errors), extra in zip(names[2:], waves, (2 * centre_error, 0.0), strict=True):
@@ -96,6 +103,31 @@ def _measure_circle(
         values.append(SectionValue(name, 0.0, float(np.ptp(wave[there])), float(np.hypot(both, extra)), note=seen))
     notes = [] if on_circle.all() else [f"{prefix or 'outer outline '}is a circle but for a part, which is left out"]
     return values, notes
+
+
+def _fit_without_grooves(places: np.ndarray, least: float) -> tuple[Circle, float]:
+    """The least-squares circle through stations (K,2) that are no grooves, and the standard deviation of these about
+    it. ``least``: standard error of a station."""
+    start = fit_circle(places)
+    assert start is not None
+    left = start.measure(places)
+    middle = max(1.4826 * float(np.median(np.abs(left - np.median(left)))), least)
+    robust = fit_circle(places, 2 * middle)
+    assert robust is not None
+    left = np.abs(robust.measure(places))
+    limit = GROOVE * max(1.4826 * float(np.median(left)), least)
+    circle = fit_circle(places[left <= limit])
+    if circle is None:
+        circle, limit = start, float("inf")
+    off = circle.measure(places[left <= limit])
+    return circle, float(np.sqrt(max(float((off**2).mean()) - least**2, 0.0)))
+
+
+def _measure_sagitta(outline: np.ndarray, nominal: Circle) -> float:
+    """How far the facets of an outline lie inside its circle, usually."""
+    edges = np.linalg.norm(np.roll(outline, -1, axis=0) - outline, axis=1)
+    half = np.minimum(float((edges**2).sum() / max(edges.sum(), 1e-300)) / 2, nominal.radius)
+    return float(nominal.radius - np.sqrt(nominal.radius**2 - half**2))
 
 
 def _smooth(cut: Cut, loop: Loop, own: np.ndarray, around: Circle, half: float) -> tuple[np.ndarray, np.ndarray]:

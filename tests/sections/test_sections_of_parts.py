@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
+from damageest_evaluate.sections.family import measure_shaft
 
 from damageest.artefacts import Floats, Part, Section
 from damageest.job.sections import SectionChoice
@@ -48,6 +49,18 @@ def test_diameter_run_out_and_roundness_of_a_shaft_with_a_bore() -> None:
             assert found.measured == pytest.approx(value, abs=0.01 if "diameter" in name else 0.03), name
         # three lobes and an eccentricity: their sum at most, its greater part at least
         assert 0.2 < (section.value("run-out").measured or 0) < 0.33
+
+
+@pytest.mark.parametrize("seed", [1, 2, 3, 5, *(pytest.param(k, marks=pytest.mark.slow) for k in range(6, 36))])
+def test_the_diameter_is_that_of_the_least_squares_circle_of_the_form(seed: int) -> None:
+    found = measure_shaft(seed)
+    assert found["error"] > 0
+    assert abs(found["measured"] - found["true"]) <= 3 * found["error"]
+
+
+def test_the_circle_that_is_meant_is_said() -> None:
+    (section,) = cut(SLEEVE, scan_shaft(15.0, (0, 0), 0.1), {"z": 5})
+    assert "least-squares circle (GG" in section.value("diameter").note
 
 
 def test_a_groove_in_a_shaft_does_not_change_its_diameter() -> None:

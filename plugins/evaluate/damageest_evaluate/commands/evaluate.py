@@ -21,6 +21,7 @@ from damageest_evaluate.commands import (
     prepare,
     real,
     realistic,
+    sections,
     speed,
     steady,
     worn,
@@ -42,6 +43,7 @@ app.command("inspections")(inspections.command)
 app.command("real")(real.command)
 app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)
+app.command("sections")(sections.command)
 app.command("speed")(speed.command)
 app.command("worn")(worn.command)
 app.command("path")(path.command)
