@@ -23,13 +23,18 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 def make_lip_and_boss() -> Loss:
-    """A lip that hangs out of the side of a block, and a boss on its top."""
+    """A lip that hangs out of the side of a block, and a boss on its top, behind a wall: no direction reaches both."""
     lip = Manifold.cube((6, 20, 4)).translate((20, -10, -10))
-    boss = Manifold.cube((14, 14, 3)).translate((-7, -7, 0))
-    return cut(BLOCK + lip + boss, lip + boss)
+    boss = Manifold.cube((14, 14, 3)).translate((-12, -7, 0))
+    wall = Manifold.cube((3, 30, 14)).translate((8, -15, 0))
+    return cut(BLOCK + wall + lip + boss, lip + boss)
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True,
+    reason="the first direction is the best for both at once, and what it leaves is too thin for a second one",
+)
 def test_three_and_two_axes_build_parts_with_a_direction_each() -> None:
     loss = make_lip_and_boss()
     three = plan(loss, axes=3, layers="auto")
