@@ -10,6 +10,7 @@ from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.orientation import find_signs
 from damageest.geometry.rays import prepare_rays
 from damageest.geometry.skin_near import NearCubes
+from damageest.geometry.vectors import normalise
 from damageest.stages.enclose._skin import SkinSamples
 
 RIM = 4.0
@@ -21,6 +22,8 @@ BELOW = 0.5
 STRAIGHT = 0.8
 """Sine from which skin lies straight below the damaged surface and faces straight away from it, in a wall of any
 thickness."""
+AROUND = 12
+"""Damaged points whose normals together tell the outward side above the flanks of a groove."""
 FIT_COUNT = 24
 LEAST_SHARE = 0.1
 """Share of the skin beside a site that no point shows, which has to be behind for any to be."""
@@ -67,11 +70,15 @@ def find_behind(
     outward = part.face_normals[deviation.face[rim]]
     evidence = np.concatenate([np.zeros(len(own)), np.einsum("ij,ij->i", normals[len(own) :], outward)])
     normals *= find_signs(points, normals, evidence)[:, None]
-    distance, near = find_neighbours(skin.points[asked], 1, points[: len(own)])
-    out, site = normals[near[:, 0]], label[few][near[:, 0]]
-    height = np.einsum("ij,ij->i", skin.points[asked] - points[near[:, 0]], out) / np.maximum(distance[:, 0], 1e-300)
-    facing = np.einsum("ij,ij->i", skin.normals[asked], out)
+    distance, near = find_neighbours(skin.points[asked], min(AROUND, len(own)), points[: len(own)])
+    site = label[few][near[:, 0]]
+    way = (skin.points[asked] - points[near[:, 0]]) / np.maximum(distance[:, :1], 1e-300)
+    height, facing = (np.einsum("ij,ij->i", one, normals[near[:, 0]]) for one in (way, skin.normals[asked]))
     is_behind = (height < -BELOW) & (facing < -BELOW)
+    # Above the flank of a groove the nearest point faces sideways: all of them round it face out.
+    out = normalise(normals[near].mean(axis=1))
+    over, against = (np.einsum("ij,ij->i", one, out) for one in (way, skin.normals[asked]))
+    is_behind |= (over < -BELOW) & (against < -BELOW)
     thin = THIN * aligned.spacing
     # Of a wall that is thick, what a deep pit has left may be thin: there the far skin is straight below the pit.
     is_left = (distance[:, 0] < thin) & (height < -STRAIGHT) & (facing < -STRAIGHT)
