@@ -14,6 +14,7 @@ from damageest_paths.layers import Layers
 from damageest.artefacts import DepositPath
 from damageest_evaluate.paths.beam import count_flips, measure_shaded, measure_sunk
 from damageest_evaluate.paths.check import count_crossings, measure_built, measure_nozzle
+from damageest_evaluate.paths.practice import measure_practice
 from damageest_evaluate.paths.scenes import Scene
 from damageest_evaluate.rows import read_rows
 
@@ -31,7 +32,7 @@ class PathRow:
     and ``sunk`` (what of the beads lies in metal, by the independent check); of the reachable: ``filled``; of the way
     along passes: ``shaded`` (metal in the beam), ``travel``, and ``between`` (travel without the first way in and the
     last way out). ``why``: what of the deposit is out of reach, by reason. ``flips``: jumps of the rotary axis.
-    ``seconds``: of the processor, to plan; ``checked``: to check."""
+    ``seconds``: of the processor, to plan; ``checked``: to check. The rest as in `Practice`."""
 
     kind: str
     name: str
@@ -58,6 +59,15 @@ class PathRow:
     seconds: float
     checked: float
     why: dict[str, float]
+    starts_a_layer: float
+    joinable: int
+    reversals: int
+    corners: int
+    tilted: float
+    jumps: int
+    air: float
+    air_95: float
+    floating: float
 
 
 def choose_options(scene: Scene) -> dict[str, object]:
@@ -108,6 +118,7 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
         seconds=planned - before,
         checked=0.0,
         why={item.why: item.volume / scene.body.volume for item in path.unreached},
+        **asdict(measure_practice(path, scene.left)),
     )
     return replace(row, checked=time.process_time() - planned)
 
@@ -199,7 +210,8 @@ def make_table(rows: Sequence[PathRow]) -> str:
 
     head = [
         "deposits", "axes", "number", "out of reach", "filled, least", "spill", "void", "gap", "from beads",
-        "in the beam", "sunk", "flips", "travel, median", "largest", "time, median", "largest",
+        "in the beam", "sunk", "flips", "travel, median", "largest", "starts a layer", "reversals", "corners", "tilted",
+        "axis jumps", "air, median", "air, 95 %", "floating", "time, median", "largest",
     ]  # fmt: skip
     lines = [head]
     for kind in [*dict.fromkeys(row.kind for row in rows), "all"]:
@@ -228,6 +240,14 @@ def _make_line(kind: str, axes: int, own: Sequence[PathRow]) -> list[str]:
         str(sum(row.flips for row in own)),
         f"{np.nanmedian([row.travel for row in some]):.0%}",
         f"{np.nanmax([row.travel for row in some]):.0%}",
+        f"{np.median([row.starts_a_layer for row in some]):.1f}, most {max(row.starts_a_layer for row in some):.1f}",
+        str(sum(row.reversals for row in some)),
+        str(sum(row.corners for row in some)),
+        f"{np.median([row.tilted for row in some]):.0%}",
+        str(sum(row.jumps for row in some)),
+        f"{np.nanmedian([row.air for row in some]):.2f}",
+        f"{np.nanmedian([row.air_95 for row in some]):.2f}",
+        f"{np.median([row.floating for row in some]):.0%}",
         f"{np.median([row.seconds for row in own]):.1f} s",
         f"{max(row.seconds for row in own):.1f} s",
     ]
