@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Ints, Part, Scan
+from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
 from damageest.checks.two_sheets import LEAST_NOISE
 from damageest.geometry.neighbourhoods import find_neighbours
 
@@ -16,6 +16,8 @@ OFF = 1.15
 """Deviation of the points from the skin after the motion, in noises, up to which it explains them."""
 KEPT = 0.9
 """Share of the points that it has to explain."""
+LEAST_ON_DATUM, SOUND = 100, 0.95
+"""Points on the datums, and share of them within the tolerance, from which the datums hold the pose."""
 SHARP = 30.0
 """Angle between triangles, in degrees, from which they belong to two faces of the part."""
 OTHERS, AROUND = 0.06, 6
@@ -48,6 +50,13 @@ def is_one_motion(aligned: Scan, deviation: Deviation, part: Part, members: Ints
     is_other = ~is_main & (around == face[:, None]).all(axis=1)
     is_other &= normals @ normals[is_main].mean(axis=0) < np.cos(np.radians(SHARP))
     return float(is_other.mean()) > OTHERS and 1.4826 * float(np.median(left[is_other])) < most
+
+
+def are_sound(distance: Floats, on_datums: Flags, tolerance: float) -> bool:
+    """Whether datums hold the pose: their points (N,), of all, lie on the part. A motion that all other skin has in
+    common is then what it has lost. ``distance`` (N,): of all points."""
+    own = np.abs(distance[on_datums])
+    return len(own) >= LEAST_ON_DATUM and float((own <= tolerance).mean()) >= SOUND
 
 
 def _number_faces(part: Part) -> Ints:

@@ -166,7 +166,7 @@ CLOSE: Route = (
     measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
     #     scanner_errors, tolerance, unit, adapter, warnings -> found
     judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
-    #     views -> found
+    #     views, aligner -> found
     fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, deviation, tolerance, asked_tolerance,
     #     unit, part -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, aligned, part, adapted, deviation, skin, unit, tolerance, explained,

@@ -13,7 +13,7 @@ from damageest.checks.elsewhere import measure_elsewhere
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
 from damageest.checks.model_fit import FittedModel
-from damageest.checks.one_motion import is_one_motion
+from damageest.checks.one_motion import are_sound, is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
 from damageest.checks.two_sheets import Sheets, measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
@@ -24,6 +24,7 @@ from damageest.findings import Level, Surplus
 from damageest.geometry.solids import to_solid, unite
 from damageest.geometry.voxels import measure_area
 from damageest.job.model import Accept, SiteChoice
+from damageest.pipeline.datums import choose_on_datums, has_datums
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
@@ -33,7 +34,7 @@ from damageest.stages.align import Align
 
 BY_RAYS = 0.5
 """Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
-JUDGED_BY = ("part", "aligned", "deviation", "skin", "coverage", "pose", "tolerance", "unit", "views")
+JUDGED_BY = ("part", "aligned", "deviation", "skin", "coverage", "pose", "tolerance", "unit", "views", "aligner")
 """What the facts of a site are gathered from."""
 
 
@@ -109,13 +110,25 @@ def is_accepted(accept: Accept, level: Level, number: int) -> bool:
 
 def _gather_all_facts(state: JobState) -> list[SiteFacts]:
     """The facts of each site, with what the others say about it."""
-    each = [_gather_site_facts(state, site) for site in state.found]
+    held = bool(state.found) and _is_held_by_datums(state)
+    each = [_gather_site_facts(state, site, held) for site in state.found]
     shifted = max((one.typical for one in each if one.one_motion), default=0.0)
     waves = [one.volume for one in each if one.count and one.deepest < SHALLOW * state.tolerance]
     return [replace(one, shifted=shifted, shallow=sum(v >= ALIKE * one.volume for v in waves)) for one in each]
 
 
-def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
+def _is_held_by_datums(state: JobState) -> bool:
+    """Whether datums that are sound hold the pose."""
+    if not has_datums(state.aligner):
+        return False
+    face, distance = state.deviation.face, state.deviation.distance
+    feet = state.aligned.points - distance[:, None] * state.part.face_normals[face]
+    on = choose_on_datums(state.aligner, state.part, feet, face)
+    return on is not None and are_sound(distance, on, state.tolerance)
+
+
+def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFacts:
+    """``held``: whether datums that are sound hold the pose: then one motion of all other skin is what it has lost."""
     # from the nearest skin, whichever: what moved by an error of pose or views is moved from there
     depth, points = -state.deviation.distance[site.members], state.aligned.points
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
@@ -142,7 +155,8 @@ def _gather_site_facts(state: JobState, site: FoundSite) -> SiteFacts:
         misplaced=0.0
         if state.views is None
         else state.views.find_explained(state.part, state.aligned, state.deviation, site.members, state.tolerance),
-        one_motion=is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
+        one_motion=not held
+        and is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
         elsewhere=measure_elsewhere(
             state.part,
             state.aligned,

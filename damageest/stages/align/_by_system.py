@@ -49,7 +49,8 @@ def finish_by_datum(
 ) -> Finish:  # fmt: skip
     """As `finish_pose`, also for a datum system, which is fitted to the points ``raw`` (M,3): all that are at hand."""
     if not isinstance(datum, DatumSystem):
-        return finish_pose(frame, points, best, noise, tolerance, unit, datum)
+        finish = finish_pose(frame, points, best, noise, tolerance, unit, datum)
+        return finish if datum is None else _question_list(frame, points, finish, noise, tolerance, unit)
     pose, free, fits, spread = _fit_datums(frame, raw, best.pose, noise, tolerance, datum)
     pose, found = _fit_rest(frame, points, pose, free, noise, tolerance)
     freedoms: tuple[FreeMotion, ...] = ()
@@ -72,6 +73,16 @@ def finish_by_datum(
         replace(best, pose=pose), freedoms, notes, depth, is_changed=True, is_held=is_held, doubts=doubts,
         datums=told.datums, left=list_motions(frame, free, unit), spread=scaled,
     )  # fmt: skip
+
+
+def _question_list(frame: Frame, points: Floats, finish: Finish, noise: float, tolerance: float, unit: str) -> Finish:
+    """The finish by a list of datums, which is asked what a system is: may a datum be worn, and what does it decide?"""
+    patches = measure_patches(frame.target, points, finish.fit.pose, noise, tolerance)
+    band = measure_bands(patches, noise, FORM * tolerance)
+    doubts = _doubt_outside(frame, patches, band, tolerance, unit)
+    if not doubts and not finish.doubts:
+        doubts = _tell_decided(frame, patches, noise, tolerance, unit)
+    return replace(finish, doubts=finish.doubts + doubts)
 
 
 def _fit_datums(
