@@ -35,9 +35,13 @@ _UNSHOWN = re.compile(r"[\x00-\x09\x0b-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u2
 of a line, marks that turn the direction of writing, and halves of surrogate pairs."""
 
 
+_EXPONENT = re.compile(r"(?<![\w./\\])\d(?:\.\d+)?e\+0\d(?=[\s,;:)]|$)")
+"""A number from 10⁴ to 10⁹ with an exponent, which a reader would have to count out; not in the name of a file."""
+
+
 def clean_message(text: object, most: int = MOST_TEXT) -> str:
     """A text that is not damageest's own, fit to be shown: of at most ``most`` characters and a note that it was cut;
-    a tab is a space, and other control characters are written out, as ``\\x1b``. Line ends stay.
+    a tab is a space, other control characters are written out, as ``\\x1b``, and 1.2e+04 is 12000. Line ends stay.
 
     What has no text, as an exception whose ``__str__`` raises, is named by its type.
     """
@@ -46,7 +50,9 @@ def clean_message(text: object, most: int = MOST_TEXT) -> str:
     except Exception:
         whole = f"(a {type(text).__name__} without text)"
     kept = whole[:most].replace("\r\n", "\n").replace("\t", " ")
-    kept = _UNSHOWN.sub(lambda found: ascii(found[0])[1:-1], kept)
+    kept = _EXPONENT.sub(
+        lambda found: f"{float(found[0]):.0f}", _UNSHOWN.sub(lambda found: ascii(found[0])[1:-1], kept)
+    )
     return kept if len(whole) <= most else f"{kept} ... (cut: {len(whole):,} characters)"
 
 

@@ -179,21 +179,41 @@ Interval = tuple[float, float]
 
 
 def describe_interval(interval: Interval | None) -> str:
-    """As "98.2 to 101" or "at least 98.2"; a dash where there is none."""
+    """As "98.2 to 101" or "at least 98.2"; a dash where there is none. Both ends have two digits of half the width."""
     if interval is None:
         return "–"
     low, high = interval
-    return f"{low:.4g} to {high:.4g}" if math.isfinite(high) else f"at least {low:.4g}"
+    if not math.isfinite(high):
+        return f"at least {write_digits(low, 2)}"
+    last = find_last(interval)
+    return f"{write_to(low, last)} to {write_to(high, last)}"
+
+
+def find_last(interval: Interval) -> int:
+    """The power of ten of the last digit that an interval bears: the second one of half its width."""
+    half = (interval[1] - interval[0]) / 2
+    return math.floor(math.log10(half)) - 1 if half > 0 else -2
+
+
+def write_to(value: float, last: int) -> str:
+    """A number rounded to a power of ten, without an exponent."""
+    return f"{round(value, -last):.{max(-last, 0)}f}"
+
+
+def write_digits(value: float, digits: int) -> str:
+    """A number with some digits, without an exponent."""
+    return write_to(value, math.floor(math.log10(abs(value))) - digits + 1) if value else "0"
 
 
 def describe_volume(volume: float, interval: Interval | None) -> str:
-    """A volume with the digits that its interval bears: two of half its width, but three to six of the volume. What
-    differs between versions of libraries is not shown then."""
-    digits = 6
-    if interval is not None and math.isfinite(interval[1]) and interval[1] > interval[0] and volume > 0:
-        last = math.floor(math.log10((interval[1] - interval[0]) / 2)) - 1
-        digits = min(max(math.floor(math.log10(volume)) - last + 1, 3), 6)
-    return f"{float(f'{volume:.{digits}g}'):.6g}"
+    """A volume with the digits that its interval bears: two of half its width, but two to six of the volume. Of a
+    volume with an open interval two, since nothing limits it above."""
+    if interval is None or volume <= 0:
+        return write_digits(volume, 4)
+    if not math.isfinite(interval[1]):
+        return write_digits(volume, 2)
+    digits = math.floor(math.log10(volume)) - find_last(interval) + 1
+    return write_digits(volume, min(max(digits, 2), 6))
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,9 @@ from pathlib import Path
 
 import pytest
 
+from damageest.artefacts import Reason
 from damageest.errors import EXTRAS, describe_install, describe_pip_install
-from damageest.findings import describe_volume
+from damageest.findings import describe_interval, describe_volume
 from damageest.registry import bundled
 
 ROOT = Path(__file__).parents[1]
@@ -79,8 +80,8 @@ def test_the_command_that_is_named_works_here(name: str) -> None:
         (49432.84, (49430.5, 49434.5), "49432.8"),
         (12345.6, (8000.0, 16000.0), "12300"),
         (0.53219, (0.51, 0.55), "0.532"),
-        (451.4123, None, "451.412"),
-        (451.4123, (80.0, float("inf")), "451.412"),
+        (451.4123, None, "451.4"),
+        (451.4123, (80.0, float("inf")), "450"),
         (0.0, (0.0, 0.0), "0"),
     ],
 )
@@ -88,3 +89,25 @@ def test_a_volume_is_told_with_the_digits_that_its_interval_bears(
     volume: float, interval: tuple[float, float] | None, said: str
 ) -> None:
     assert describe_volume(volume, interval) == said
+
+
+@pytest.mark.parametrize(
+    ("interval", "said"),
+    [
+        (None, "–"),
+        ((5948.6, 5970.4), "5949 to 5970"),
+        ((538.6, 8000.0), "500 to 8000"),
+        ((0.0, 46010.0), "0 to 46000"),
+        ((637.9, float("inf")), "at least 640"),
+        ((0.512, 0.556), "0.512 to 0.556"),
+        ((12.0, 12.0), "12.00 to 12.00"),
+    ],
+)
+def test_an_interval_is_told_with_two_digits_of_half_its_width(interval: tuple[float, float] | None, said: str) -> None:
+    assert describe_interval(interval) == said
+
+
+def test_a_reason_has_no_exponents_and_its_remedy_is_a_sentence() -> None:
+    assert str(Reason("beside", "up to 4.601e+04 mm³ lost", remedy="scan again")) == "up to 46010 mm³ lost. Scan again"
+    assert str(Reason("align", "it is free", remedy="align: none")) == "it is free. align: none"
+    assert str(Reason("align", "a/1e+05/1.2e+05.ply stays")) == "a/1e+05/1.2e+05.ply stays"

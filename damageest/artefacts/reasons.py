@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from typing import Literal
 
@@ -36,4 +37,8 @@ class Reason:
         object.__setattr__(self, "remedy", clean_message(self.remedy))
 
     def __str__(self) -> str:
-        return f"{self.text}; {self.remedy}" if self.remedy else self.text
+        """The text, and the remedy as a sentence of its own."""
+        if not self.remedy:
+            return self.text
+        is_key = re.match(r"\w+:", self.remedy)  # a line of a job is written as it is
+        return f"{self.text}. {self.remedy if is_key else self.remedy[0].upper() + self.remedy[1:]}"

@@ -86,13 +86,13 @@ def ask_beyond_points(
     reason = ""
     if share > ASKED and over >= bulge:
         reason = (
-            f"its volume of {volume:.4g} {unit}³ is more than the skin under it times the depth of its scan points "
-            f"allows ({most:.4g}): its surface bulges where it has no scan points"
+            f"its volume of {volume:.4g} {unit}³ exceeds lost skin times depth ({most:.4g} {unit}³): its surface "
+            "bulges without scan points"
         )
     elif share > ASKED:
         reason = (
-            f"{amount:.3g} {unit}³ of it ({share:.1%}) lie behind the scan points near them, up to "
-            f"{behind.max():.3g} {unit}: its surface bulges between the points, which are {gap:.3g} {unit} apart"
+            f"its surface bulges by {amount:.3g} {unit}³ ({share:.1%}), up to {behind.max():.3g} {unit}, between "
+            f"points that are {gap:.3g} {unit} apart"
         )
     return BeyondPoints(amount, share, depth, reason, short)
 

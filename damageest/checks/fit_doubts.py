@@ -43,7 +43,7 @@ def find_fit_doubts(
     )
     if by_form:
         names = f"site{'s' if len(by_form) > 1 else ''} {', '.join(map(str, by_form))}"
-        found.append(f"{names} may be skin that deviates and no damage")
+        found.append(f"{names} may be deviating skin without damage")
     outside = deviation.label == ADDED
     for one in surplus:
         if one.kind == "surroundings":
@@ -52,5 +52,5 @@ def find_fit_doubts(
     if outside.any():
         area = measure_area(aligned.points[outside], skin.cells.edge, FEWEST_OUTSIDE)
         if area > LARGE * max(seen, 1e-300):
-            found.append(f"an area of {area / max(seen, 1e-300):.0%} of the skin seen lies outside the part")
+            found.append(f"an area of {area / max(seen, 1e-300):.0%} of the seen skin lies outside the part")
     return tuple(found)

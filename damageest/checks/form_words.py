@@ -19,12 +19,12 @@ def describe_fit(
     whether the part as designed explains the skin. ``partly``: what limits a fit that holds, of `describe_view_of`."""
     words = {
         "ok": f"the part as designed explains the intact skin{partly}",
-        "open": f"whether the part as designed explains the intact skin is open: {'; '.join(doubts)}",
+        "open": f"cannot tell whether the part matches its CAD: {'; '.join(doubts)}",
         "scaled": _describe_scale(fit, unit),
         "deformed": _describe_deformation(fit, unit),
         "views disagree": _describe_views(fit, unit),
-        "wavy": f"the intact skin is wavy: it deviates by {fit.waviness:.3g} {unit} (standard deviation) over areas "
-        f"wider than {20 * tolerance:.3g} {unit}, inside and outside alike (waviness of scanner or part)",
+        "wavy": f"wavy skin: it deviates by {fit.waviness:.3g} {unit} (standard deviation) both ways over areas "
+        f"wider than {20 * tolerance:.3g} {unit} (waviness of scanner or part)",
     }[fit.model]
     if fit.corrected_scale != 1:
         words = (
@@ -49,17 +49,17 @@ def _describe_scale(fit: ModelFit, unit: str) -> str:
     percent = 100 * (fit.scale - 1)
     larger = "larger" if percent > 0 else "smaller"
     return (
-        f"the scale is wrong: the scan is {abs(percent):.3g} % {larger} than the part (standard error "
-        f"{100 * fit.scale_error:.2g} %), up to {fit.amount:.3g} {unit} at its ends (unit, temperature or scale bar); "
-        "scan: {scale: auto} corrects it"
+        f"wrong scale: the scan is {abs(percent):.3g} % {larger} than the part (standard error "
+        f"{100 * fit.scale_error:.2g} %), up to {fit.amount:.3g} {unit} at its ends; check unit, temperature and scale "
+        "bar, or correct it by scan: {scale: auto}"
     )
 
 
 def _describe_deformation(fit: ModelFit, unit: str) -> str:
     kinds = " and ".join(f"{DONE[kind]} by {amount:.3g} {unit}" for kind, amount in fit.deformation)
     return (
-        f"the part is {kinds}: the seen skin lies up to {fit.amount:.3g} {unit} (standard error "
-        f"{fit.amount_error:.2g}) away from where the nearest rigid part has it"
+        f"the part is {kinds}: the seen skin deviates by up to {fit.amount:.3g} {unit} (standard error "
+        f"{fit.amount_error:.2g}) from the nearest rigid part"
     )
 
 
@@ -68,23 +68,20 @@ def _describe_views(fit: ModelFit, unit: str) -> str:
     moved = [_describe_view(view, unit) for view in fit.views if view.is_corrected]
     left = [_describe_view(view, unit) for view in fit.views if view.is_elsewhere and not view.is_corrected]
     open_ = [str(view.number + 1) for view in fit.views if not view.is_determined and view.left > 0.5 * apart]
-    words = f"the views of the scan disagree by {apart:.3g} {unit} where they overlap"
+    words = f"views disagree by {apart:.3g} {unit} where they overlap"
     words += {
         "given": "",
-        "order": f" ({len(fit.views)} views, told by the order of the points)",
-        "sheets": " (two views, told by two surfaces over the same skin)",
+        "order": f" ({len(fit.views)} views, by the order of the points)",
+        "sheets": " (two views, by two surfaces over the same skin)",
     }[fit.views_from]
     if moved:
         words += "; corrected: " + ", ".join(moved)
     if left:
-        words += "; misplaced, and not corrected: " + ", ".join(left)
+        words += "; misplaced, not corrected: " + ", ".join(left)
     if open_:
-        words += f"; these do not fix their pose by themselves: view {', '.join(open_)}"
+        words += f"; not corrected, since their pose is not fixed: view {', '.join(open_)}"
     if fit.views_hidden:
-        words += (
-            f"; of what was corrected, {fit.views_hidden:.3g} {unit}³ may be wear instead, on skin that one view alone "
-            "shows"
-        )
+        words += f"; {fit.views_hidden:.3g} {unit}³ of the correction may be wear, on skin of one view alone"
     return words
 
 

@@ -59,8 +59,8 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
     if wanted is not None and not LEAST_TOLERANCE * part.diagonal <= wanted <= part.diagonal:
         low, high = LEAST_TOLERANCE * part.diagonal, part.diagonal
         raise InputError(
-            f"tolerance: {wanted:g} {part.unit} cannot be used for a part that is {part.diagonal:.4g} {part.unit} "
-            f"across; give {low:.2g} to {high:.4g}, or auto; is `units` right?"
+            f"tolerance: {wanted:g} {part.unit} does not fit a part that is {part.diagonal:.4g} {part.unit} across; "
+            f"give {low:.2g} to {high:.4g}, or auto; check `units`"
         )
     least = 1e-4 * part.diagonal
     noise = float(np.hypot(scan.noise, part.scan_noise))
@@ -72,23 +72,23 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
     if step:
         least = AUTO_STEPS * step
         text = (
-            f"the scan's depth has steps of {step:.3g} {unit}, as of a depth camera: damage shallower than about "
-            f"{least:.3g} {unit} cannot be found in it"
+            f"depth in steps of {step:.3g} {unit}, like that of a depth camera: damage shallower than {least:.3g} "
+            f"{unit} is not found"
         )
-        found.append(Reason("depth_steps", text, amount=least, unit=unit))
+        remedy = "scan with finer depth if shallower damage matters"
+        found.append(Reason("depth_steps", text, amount=least, unit=unit, remedy=remedy))
     if step and tolerance < step:
         text = (
-            f"the tolerance {tolerance:.3g} {unit} is less than one step of the scan's depth: intact surface may be "
-            "taken for damage"
+            f"the tolerance {tolerance:.3g} {unit} is below one depth step of the scan: intact surface may look damaged"
         )
-        remedy = f"{AUTO_STEPS * step:.3g} {unit} would be safe"
+        remedy = f"take a tolerance of {AUTO_STEPS * step:.3g} {unit}"
         found.append(Reason("tolerance_small", text, amount=step, unit=unit, remedy=remedy))
     elif tolerance < 3 * scan.noise:
         text = (
-            f"the tolerance {tolerance:.3g} {unit} is less than three times the scan's noise of {scan.noise:.3g} "
-            f"{unit}: intact surface may be mistaken for damage"
+            f"the tolerance {tolerance:.3g} {unit} is below three times the noise of {scan.noise:.3g} {unit}: intact "
+            "surface may look damaged"
         )
-        remedy = f"{AUTO_TOLERANCE * scan.noise:.3g} {unit} would be safe"
+        remedy = f"take a tolerance of {AUTO_TOLERANCE * scan.noise:.3g} {unit}"
         found.append(Reason("tolerance_small", text, amount=scan.noise, unit=unit, remedy=remedy))
     if part.tessellation_error > tolerance / 2:
         text = (
@@ -99,10 +99,11 @@ def choose_tolerance(wanted: float | None, scan: Scan, part: Part, step: float =
         found.append(Reason("coarse_part", text, amount=part.tessellation_error, unit=unit, remedy=remedy))
     if scan.spacing > 5 * tolerance:
         text = (
-            f"the scan's points lie {scan.spacing:.3g} {unit} apart, far more than the tolerance of {tolerance:.3g} "
-            f"{unit}: the damage surface between them is interpolated"
+            f"sparse scan: points {scan.spacing:.3g} {unit} apart, tolerance {tolerance:.3g} {unit}; the surface "
+            "between them is interpolated"
         )
-        found.append(Reason("sparse_scan", text, amount=scan.spacing, unit=unit))
+        remedy = "scan more densely, or raise the tolerance"
+        found.append(Reason("sparse_scan", text, amount=scan.spacing, unit=unit, remedy=remedy))
     return tolerance, found
 
 
@@ -111,11 +112,8 @@ def describe_few(scan: Scan) -> list[Reason]:
     count = len(scan.points)
     if count >= FEW_POINTS:
         return []
-    text = (
-        f"the scan has {count} point{'s' * (count > 1)}, too few to show the skin between them: damage can be anywhere "
-        "else"
-    )
-    return [Reason("few_points", text, amount=count)]
+    text = f"only {count} scan point{'s' * (count > 1)}: damage between them stays hidden"
+    return [Reason("few_points", text, amount=count, remedy="check the file, or scan again")]
 
 
 def measure_form_deviation(distance: Floats, within: float) -> float:
@@ -149,11 +147,11 @@ def raise_tolerance(tolerance: float, distance: Floats, part: Part, noise: float
     if needed <= RAISE * tolerance:
         return tolerance, []
     text = (
-        f"intact surface deviates from the part by {deviation:.3g} (standard deviation), far more than the scan's "
-        f"noise of {noise:.3g}: form errors of scanner or part, or an inexact pose; tolerance: auto was raised from "
-        f"{tolerance:.3g} to {needed:.3g}, and shallower damage is not found"
+        f"tolerance raised from {tolerance:.3g} to {needed:.3g} {part.unit}: intact surface deviates by "
+        f"{deviation:.3g} {part.unit} (standard deviation), the noise is {noise:.3g} {part.unit}"
     )
-    return needed, [Reason("tolerance_raised", text, amount=needed, unit=part.unit)]
+    remedy = "check scanner and pose if shallower damage matters"
+    return needed, [Reason("tolerance_raised", text, amount=needed, unit=part.unit, remedy=remedy)]
 
 
 def require_tolerance(tolerance: float, distance: Floats, part: Part, noise: float) -> None:
@@ -257,12 +255,12 @@ def check_walls(tolerance: float, part: Part) -> list[Reason]:
     thin = float((thickness < 2 * tolerance).mean())
     if thin < 0.1:
         return []
-    walls = f"{float(np.quantile(thickness, 0.1)):.3g} {part.unit} thick where they are thin"
+    walls = f"{float(np.quantile(thickness, 0.1)):.3g} {part.unit}"
     text = (
-        f"the tolerance {tolerance:.3g} {part.unit} is more than half the thickness of the part's walls on {thin:.0%} "
-        f"of its surface (walls are {walls}): no damage can be found there"
+        f"the tolerance {tolerance:.3g} {part.unit} exceeds half the wall thickness on {thin:.0%} of the surface (thin "
+        f"walls: {walls}): no damage is found there"
     )
-    return [Reason("thin_walls", text, amount=thin)]
+    return [Reason("thin_walls", text, amount=thin, remedy="take a smaller tolerance, with a scan of less noise")]
 
 
 def require_walls(tolerance: float, part: Part) -> None:

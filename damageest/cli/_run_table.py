@@ -29,9 +29,6 @@ UNSEEN_WHY = {
     "earlier scan": "not in the earlier scan either",
 }
 
-NOTHING_TOLD = 4
-"""Terms that are in no interval where the job tells neither certificate nor temperature: then it knows that."""
-
 
 def print_table(result: Result, target: Path) -> None:
     """Prints the sites with the result of the check against the scan, notes, and the path of the output folder."""
@@ -39,7 +36,7 @@ def print_table(result: Result, target: Path) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from damageest.findings import describe_interval, describe_volume
+    from damageest.findings import describe_interval, describe_volume, write_digits
     from damageest.geometry.units import describe_size
     from damageest.rules.advice import list_topics
     from damageest.rules.notes import cap_notes, list_notes, qualify_nothing
@@ -62,27 +59,30 @@ def print_table(result: Result, target: Path) -> None:
         for site in result.sites:
             verdict = site.verdict.level + ("" if site.accepted == (site.verdict.level != "doubtful") else ", accepted")
             volume = describe_volume(site.damage.volume, site.volume_95)
-            numbers = [volume, f"{site.surface.area:.4g}", f"{site.max_depth:.4g}"]
+            numbers = [volume, write_digits(site.surface.area, 3), write_digits(site.max_depth, 3)]
             if len(heads) > 4:
                 stock = getattr(site.deposit, "stock_volume", None)
-                numbers += [f"{site.deposit.volume:.6g}" if site.deposit else "–"]
-                numbers += ["–" if stock is None else f"{stock:.6g}"]
+                numbers += [write_digits(site.deposit.volume, 4) if site.deposit else "–"]
+                numbers += ["–" if stock is None else write_digits(stock, 4)]
             table.add_row(str(site.id), *numbers, describe_interval(site.volume_95), site.method, verdict)
         console.print(table)
         known = "" if result.volume_95 is None else f" (95 %: {describe_interval(result.volume_95)})"
         # what an earlier scan shows bounds no volume of its own
-        whole = "" if result.part.unseen is not None else f"; part volume: {result.part.volume:.6g} {unit}³"
+        whole = (
+            "" if result.part.unseen is not None else f"; part volume: {write_digits(result.part.volume, 6)} {unit}³"
+        )
         show(f"damage volume: {describe_volume(result.damage_volume, result.volume_95)} {unit}³{known}{whole}")
         if volumes := result.describe_volumes():
             show(f"of it and beside it: {volumes}")
-        if 0 < len(result.not_in_budget) < NOTHING_TOLD:
-            show(f"not known, and in no interval: {', '.join(result.not_in_budget)}")
     elif not result.failures:
         where = f"{_on_seen(result)}{qualify_nothing(result.warnings)}"
         show(f"no damage deeper than the tolerance of {result.tolerance:.4g} {unit} was found{where}")
         if result.pose.free and result.volume_95 and result.volume_95[1] > 0:
             most = f"{result.volume_95[1]:.4g} {unit}³"
-            show(f"the pose is free: wear of up to {most} over a whole face would not show; see align.datum")
+            show(
+                f"the pose is free: wear of up to {most} over a whole face stays hidden. Name unworn faces in "
+                "align.datum"
+            )
     scan = describe_size(result.aligned.points, unit, STRAYS)
     show(f"part {describe_size(result.part.vertices, unit)}, scan {scan} along the part's axes")
     _print_coverage(result, show)
@@ -120,22 +120,22 @@ def _print_coverage(result: Result, show: Show) -> None:
         x, y, z = region.centre
         why = "" if region.why == "unknown" else f" ({UNSEEN_WHY[region.why]})"
         show(
-            f"unseen: {region.area:.4g} {unit}² near ({x:.4g}, {y:.4g}, {z:.4g}){why}; a loss of up to "
-            f"{region.volume:.4g} {unit}³ there would not show"
+            f"unseen: {region.area:.3g} {unit}² near ({x:.3g}, {y:.3g}, {z:.3g}){why}; it may hide a loss of up to "
+            f"{region.volume:.3g} {unit}³"
         )
     if more := regions[MOST_UNSEEN:]:
-        show(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.4g} {unit}²")
+        show(f"unseen: {len(more)} smaller regions, {sum(one.area for one in more):.3g} {unit}²")
 
 
 def _describe_sensor(sensor: Sensor, unit: str) -> str:
     """The smallest loss that the scan can show, and why."""
-    why = [f"noise {sensor.noise:.3g}"]
+    why = [f"noise {sensor.noise:.2g}"]
     if sensor.correlated > sensor.noise / 4:
-        why.append(f"errors of {sensor.correlated:.3g} that regions of about {sensor.alike:.2g} share")
+        why.append(f"errors of {sensor.correlated:.2g} common to regions of {sensor.alike:.2g}")
     if sensor.depth_step:
-        why.append(f"depth in steps of {sensor.depth_step:.3g}")
-    least = f"{sensor.least_depth:.3g} {unit} or narrower than {sensor.least_width:.2g} {unit}"
-    return f"losses shallower than {least} cannot be seen in this scan ({', '.join(why)})"
+        why.append(f"depth steps {sensor.depth_step:.2g}")
+    least = f"{sensor.least_depth:.3g} {unit} deep, {sensor.least_width:.2g} {unit} wide"
+    return f"smallest visible loss: {least} ({', '.join(why)})"
 
 
 def list_surplus(items: Sequence[Surplus], unit: str) -> list[str]:
@@ -153,21 +153,21 @@ def _fold_surplus(kind: str, items: Sequence[Surplus], unit: str) -> str:
     guessed = sum(item.estimate for item in items if item.volume is None)
     volumes = [f"{sum(closed):.4g} {unit}³ together"] if closed else []
     if left := len(items) - len(closed):
-        which = f"{left} of them without a closed volume" if closed else "no closed volume"
-        volumes.append(f"{which}, about {guessed:.2g} {unit}³ (an estimate: area times mean height)")
+        which = f"{left} of them open" if closed else "open"
+        volumes.append(f"{which}, about {guessed:.2g} {unit}³ (estimate)")
     height, area = max(item.height for item in items), sum(item.area for item in items)
     named = "" if kind == "surplus" else f" ({kind})"
     return (
-        f"surplus{named}: {len(items)} smaller ones, {', '.join(volumes)}, up to {height:.4g} {unit} high, "
-        f"{area:.4g} {unit}²"
+        f"surplus{named}: {len(items)} smaller ones, {', '.join(volumes)}, up to {height:.3g} {unit} high, "
+        f"{area:.3g} {unit}²"
     )
 
 
 def _describe_surplus(item: Surplus, unit: str) -> str:
-    volume = f"about {item.estimate:.2g} {unit}³ (an estimate)" if item.volume is None else f"{item.volume:.6g} {unit}³"
-    size = f"{item.height:.4g} {unit} high, {item.area:.4g} {unit}²"
+    volume = f"about {item.estimate:.2g} {unit}³ (estimate)" if item.volume is None else f"{item.volume:.3g} {unit}³"
+    size = f"{item.height:.3g} {unit} high, {item.area:.3g} {unit}²"
     if item.kind == "surroundings":
-        size = f"up to {item.height:.4g} {unit} from the part"
+        size = f"up to {item.height:.3g} {unit} from the part"
     words = [*([volume] if item.kind != "surroundings" else []), size, f"{item.share:.1%} of the scan"]
     named = "" if item.kind == "surplus" else f" ({item.kind})"
     notes = item.notes if item.kind == "surplus" else ()  # the others are among the warnings

@@ -133,8 +133,8 @@ def _run_jobs(jobs: list[Path], given: _Given) -> int:
         if result.sites and not any(site.accepted for site in result.sites):
             status = max(status, 1)
             say(
-                f"error: {job.source}: none of the sites is accepted as damage; see the reasons of each, and "
-                "name those that are damage in the job:  accept: [1],  or  accept: all\n" + format_help("not_accepted"),
+                f"error: {job.source}: no site is accepted as damage. Read the reasons, and accept sites in the job: "
+                "accept: [1], or accept: all\n" + format_help("not_accepted"),
                 err=True,
             )
         if result.failures:

@@ -108,11 +108,10 @@ class ConfidenceCount:
         if self._least is None:
             return ()
         text = (
-            f"{self._low} of {self._with} scan points were set aside, since their confidence is below {self._least:g} "
-            "(min_confidence)"
+            f"{self._low} of {self._with} scan points were removed: confidence below {self._least:g} (min_confidence)"
         )
         if self._without:
-            text += f"; {self._without} points of other files have none, and are used"
+            text += f"; {self._without} points without confidence are used"
         return (Reason("low_confidence", text, amount=self._low),)
 
 
@@ -131,10 +130,10 @@ def describe_coarse(points: Floats, path: Path) -> Reason | None:
     if not 0 < size < COARSE * step or not np.array_equal(known, known.astype(np.float32)):
         return None
     text = (
-        f"{path.name}: its coordinates are in single precision and up to {far.max():.4g} from the origin: they stand "
-        f"in steps of {step:.2g}, with {size / step:.0f} steps across the scan"
+        f"{path.name}: single precision so far from the origin ({far.max():.4g}) gives steps of {step:.2g}, "
+        f"{size / step:.0f} across the scan"
     )
-    return Reason("coarse_numbers", text, amount=step, remedy="move the scan near the origin before it is exported")
+    return Reason("coarse_numbers", text, amount=step, remedy="move the scan near the origin, then export it")
 
 
 def _list_names(names: list[str]) -> str:

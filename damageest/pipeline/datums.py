@@ -77,6 +77,4 @@ def describe_moved(part: Part, motion: Floats, tolerance: float, unit: str, why:
     if far <= MOVED * tolerance:
         return ()
     text = f"the datums do not hold the pose: {why}, by up to {far:.3g} {unit}"
-    return [
-        Reason("datum_moved", text, amount=far, unit=unit, remedy=f"give  {instead}  where the datums have to hold")
-    ]
+    return [Reason("datum_moved", text, amount=far, unit=unit, remedy=f"give {instead} if the datums must hold")]

@@ -175,7 +175,8 @@ def question_fit(
     fit = _tell_adapted(replace(fitted, fit=fit), adapted).fit
     # a corrected scale was reported in a note whose text is no longer true
     kept = [note for note in warnings if note.code != "model_fit"]
-    return replace(fitted, fit=fit), [*kept, Reason("model_fit", fit.words)]
+    remedy = "look at the report: colour the scan by distance"
+    return replace(fitted, fit=fit), [*kept, Reason("model_fit", fit.words, remedy=remedy)]
 
 
 def measure_at_site(

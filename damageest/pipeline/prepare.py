@@ -60,10 +60,10 @@ def choose_columns(scan: Scan, part: Part, reader: ReadScan | None, unit: str) -
     if not fits:
         return scan
     text = (
-        f"{'; '.join(scan.columns)}, but their size is not the part's: the scan was read as "
-        f"columns: '{fits[0].columns[0]}', which is of its size"
+        f"{'; '.join(scan.columns)}, but their size does not fit the part: the scan was read as "
+        f"columns: '{fits[0].columns[0]}', which fits"
     )
-    remedy = "give scan.columns to say what they are"
+    remedy = "name the columns in scan.columns"
     return replace(fits[0], warnings=(*fits[0].warnings, Reason("columns", text, remedy=remedy)))
 
 
@@ -90,11 +90,12 @@ def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
     if not far.any():
         return scan, ()
     text = (
-        f"{int(far.sum())} scan points were set aside, since they are farther from all others than the part is "
-        f"large ({part.diagonal:.4g} {part.unit}), and few"
+        f"{int(far.sum())} stray scan points were removed, farther than {part.diagonal:.4g} {part.unit} from all others"
     )
     scan = scan.take(~far)
-    return replace(scan, notes=(*scan.notes, text)), [Reason("far_points", text, amount=int(far.sum()))]
+    return replace(scan, notes=(*scan.notes, text)), [
+        Reason("far_points", text, amount=int(far.sum()), remedy="delete them in the scanner's software")
+    ]
 
 
 @step(gives=("noise", "spacing", "depth_step"), kept=True)
@@ -137,11 +138,10 @@ def set_filled_aside(scan: Scan) -> tuple[Scan, Reasons]:
         return scan, ()
     x, y, z = np.median(scan.points[filled], axis=0)
     text = (
-        f"{int(filled.sum()):,} scan points ({filled.mean():.1%}) were set aside: they lie on a sheet near ({x:.4g}, "
-        f"{y:.4g}, {z:.4g}) of the scan's frame that has less than a tenth of the noise elsewhere, as software makes "
-        "it to close what the scanner did not see"
+        f"{int(filled.sum()):,} scan points ({filled.mean():.1%}) near ({x:.3g}, {y:.3g}, {z:.3g}) were removed: a "
+        "sheet with a tenth of the usual noise, like a filled hole"
     )
-    remedy = "export the scan without filling holes and without closing it (not watertight)"
+    remedy = "export the scan without filled holes (not watertight)"
     scan = scan.take(~filled)
     reason = Reason("filled_points", text, amount=int(filled.sum()), remedy=remedy)
     return replace(scan, notes=(*scan.notes, text)), [reason]

@@ -98,10 +98,10 @@ def _compare_noise(certificate: Certificate, aligned: Scan, unit: str) -> Reason
     if form is None or measured <= FAR * form:
         return ()
     text = (
-        f"the scan contradicts the scanner's certificate: 95 % of its points scatter over {measured:.3g} {unit}, and "
-        f"the probing form error is {form:.3g} {unit}; the measured noise counts"
+        f"the scan contradicts its certificate: 95 % of the points scatter over {measured:.3g} {unit}, the probing "
+        f"form error is {form:.3g} {unit}; the measured noise counts"
     )
-    remedy = "look whether certificate, settings and surface (gloss, roughness, spray) are those of this scan"
+    remedy = "check certificate, settings and surface (gloss, roughness, spray)"
     return [Reason("certificate", text, amount=measured, unit=unit, remedy=remedy)]
 
 
@@ -122,5 +122,5 @@ def _compare_scale(
         f"the scan is {100 * abs(off):.2g} % {'larger' if off > 0 else 'smaller'} than the part, and the certificate"
         f"{' and the temperature' if temperature else ''} allow {100 * most:.2g} %"
     )
-    remedy = "" if temperature else "give the part's temperature: steel at 28 °C is 0.009 % larger than at 20 °C"
+    remedy = "" if temperature else "give the part's temperature (steel grows by 0.009 % from 20 to 28 °C)"
     return [Reason("certificate", text, amount=100 * off, unit="%", remedy=remedy)]

@@ -117,11 +117,10 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
     deepest = max([state.explained.deepest, *(site.measure_depth(state.part, state.aligned) for site in gone)])
     all_causes = {*causes.values(), *(("views",) if state.explained.places else ())}
     told = [_describe_cause(state, cause) for cause in CAUSES if cause in all_causes]
-    many, unit = f"{count} places are" if count > 1 else "1 place is", state.unit
+    many, unit = f"{count} places" if count > 1 else "1 place", state.unit
     text = (
-        f"{many} below the skin by up to {deepest:.3g} {unit}, which errors of this scan explain: "
-        f"{'; '.join(words for words, _ in told)}; they are no sites, and their {volume:.4g} {unit}³ are in the high "
-        "end of the total"
+        f"{many} up to {deepest:.3g} {unit} deep treated as errors of the scan, not as sites: "
+        f"{'; '.join(words for words, _ in told)}; the high end of the total includes their {volume:.3g} {unit}³"
     )
     kept = tuple(site for site in state.found if site.number not in causes)
     return kept, volume, [Reason("below_noise", text, amount=volume, unit=f"{unit}³", remedy=told[0][1])]
@@ -181,14 +180,14 @@ def _describe_cause(state: JobState, cause: str) -> tuple[str, str]:
     if cause == "shallow":
         limit = _choose_limit(state)
         return (
-            f"its points deviate by {np.hypot(sensor.noise, sensor.correlated):.3g} {unit} on intact skin, so that "
-            f"losses below {limit:.3g} {unit} cannot be seen in it",
-            f"tolerance: {limit:.2g}, or a scan with smaller errors",
+            f"intact points deviate by {np.hypot(sensor.noise, sensor.correlated):.3g} {unit}, so losses below "
+            f"{limit:.3g} {unit} are invisible",
+            f"take tolerance: {limit:.2g}, or a better scan",
         )
     if cause == "views":
         return (
-            f"at {sheets.share:.1%} of its points it shows two surfaces, {sheets.apart:.3g} {unit} apart, as of views "
+            f"two surfaces {sheets.apart:.3g} {unit} apart at {sheets.share:.1%} of the points, like those of views "
             "that do not fit together",
-            "register the views to each other again, or give them as a list of files, so that they can be fitted",
+            "register the views again, or give them as a list of files",
         )
-    return "so few points lie on them, among intact ones, that they may be stray", "scan these places more densely"
+    return "few points among intact ones", "scan these places more densely"

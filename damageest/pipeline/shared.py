@@ -30,11 +30,11 @@ def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: s
         )
     area = float(np.linalg.norm(part.cross[~part.unseen], axis=1).sum() / 2)
     text = (
-        f"the part is an earlier scan, which shows {area:.4g} {unit}² of skin: what is said holds there alone; "
-        f"{1 - kept.mean():.0%} of the later scan's points show other skin and were set aside"
+        f"the earlier scan shows {area:.4g} {unit}² of skin, and the result holds there alone; {1 - kept.mean():.0%} "
+        "of the later scan's points show other skin and were removed"
     )
     if other.any():
         text += f", {int(other.sum())} of them below the skin, on surfaces that may have been there before"
-    remedy = "if it is the scan that shows the part as designed, part and scan are swapped"
+    remedy = "check that part and scan are not swapped"
     told = Reason("earlier_scan", text, amount=float(1 - kept.mean()), remedy=remedy)
     return (replace(scan, notes=(*scan.notes, text)).take(kept), aligned.take(kept), [told])

@@ -102,7 +102,7 @@ def gather_sites(
         failures.append(error)
     warnings = []
     if dropped > 1e-3 * sum(site.damage.volume for site in out):
-        text = f"pieces of {dropped:.3g} {unit}³ that no damaged point touches were dropped"
+        text = f"dropped {dropped:.3g} {unit}³ of fragments without scan points"
         warnings.append(Reason("scraps", text, amount=dropped, unit=f"{unit}³"))
     return tuple(out), failures, warnings
 
@@ -128,7 +128,7 @@ def set_specks_aside(
         members = sites.members(error.site) if error.place and error.site else np.empty(0, np.int64)
         if 0 < len(members) < SPECK:
             depth = float(-deviation.distance[members].min())
-            text = f"{error.place}, up to {depth:.3g} {unit} deep, are too few to bound a volume and were left out"
+            text = f"{error.place}, up to {depth:.3g} {unit} deep, are too few for a volume and were left out"
             place = find_place(aligned.points, members)
             warnings.append(Reason("speck", text, amount=depth, unit=unit, place=place))
         else:

@@ -87,8 +87,8 @@ def relate_surplus(
         covered = (item.id, item.area)
         sites = [replace(s, covered=(*s.covered, covered)) if s.number in touching else s for s in sites]
         if item.kind == "displaced piece":
-            of = " and ".join(f"site {site.number} with a volume of {site.damage.volume:.4g}" for site in beside)
-            own = "" if item.volume is None else f" with a volume of {item.volume:.4g}"
+            of = " and ".join(f"site {site.number} ({site.damage.volume:.3g} {unit}³)" for site in beside)
+            own = "" if item.volume is None else f" ({item.volume:.3g} {unit}³)"
             volumes = [other.damage.volume for other in beside]
             equal = {
                 site.number
@@ -100,19 +100,17 @@ def relate_surplus(
                 )
             }
             sites = [replace(s, displaced=(*s.displaced, item.id)) if s.number in equal else s for s in sites]
-            text = f"surplus {item.id}{own} may be a piece of the part that was displaced" + (
-                f", and {of} its place" if of else ""
-            )
+            text = f"surplus {item.id}{own} may be a displaced piece" + (f" of {of}" if of else "")
             remedy = "put it back and scan again, or repair the part as if the piece were lost"
             place = find_place(aligned.points, item.points)
             warnings.append(
                 Reason("displaced_piece", text, amount=item.volume, unit=f"{unit}³", place=place, remedy=remedy)
             )
     if outside := [item for item in done if item.kind == "surroundings"]:
-        names = "; ".join(f"surplus {item.id}: {item.share:.1%} of the scan, {item.notes[0]}" for item in outside[:5])
+        names = "; ".join(f"surplus {item.id}: {item.notes[0]}" for item in outside[:5])
         share = sum(item.share for item in outside)
-        text = f"{share:.1%} of the scan does not belong to the part ({names}), and was left out"
-        remedy = "crop the scan to the part to be sure: scan: {crop: ...}"
+        text = f"removed {share:.1%} of the scan: not part of the part ({names})"
+        remedy = "crop the scan to be sure: scan: {crop: ...}"
         warnings.append(Reason("surroundings", text, amount=share, remedy=remedy))
     return tuple(done), tuple(sites), warnings
 

@@ -15,9 +15,7 @@ SHALLOW = 1.3
 
 class AdaptedSkin(Rule):
     code = "adapted_skin"
-    meaning = (
-        "the part was adapted, and the loss is hardly deeper than the tolerance: the field may not follow it there"
-    )
+    meaning = "the loss on an adapted part is hardly deeper than the tolerance: the field may miss form there"
     threshold = (
         f"on a part adapted by {MOVED:g} tolerance or more, 95% of its points are not deeper than "
         f"{SHALLOW:g} tolerances"
@@ -28,7 +26,7 @@ class AdaptedSkin(Rule):
         if scan.adapted < MOVED * scan.tolerance or site.deepest > SHALLOW * scan.tolerance:
             return
         text = (
-            f"it is at most about {site.deepest:.3g} {scan.unit} deep, on a part that was deformed by up to "
-            f"{scan.adapted:.3g} {scan.unit} to follow the scan: it may be form that the field does not follow"
+            f"only {site.deepest:.3g} {scan.unit} deep, on a part that was deformed by up to "
+            f"{scan.adapted:.3g} {scan.unit}: the field may miss form here"
         )
         yield Reason(self.code, text, "contradicts", site.deepest, scan.unit, remedy=self.remedy)

@@ -17,7 +17,7 @@ the ends; worn skin may go on where the scan does not show it."""
 
 class Beside(Rule):
     code = "beside"
-    meaning = "skin beside the site is not seen: the damage may go on there"
+    meaning = "skin beside the site is unseen: the damage may continue there"
     threshold = (
         f"{SKIN:.0%} of the skin beside it or {RIM:.0%} of its rim; from {SKIN_OPEN:.0%} or {RIM_OPEN:.0%} on the "
         "upper end is open"
@@ -33,6 +33,6 @@ class Beside(Rule):
         is_open = skin > SKIN_OPEN or rim > RIM_OPEN
         beside = site.uncertainty.beside if site.uncertainty else 0.0
         words = [f"{skin:.0%} of the skin beside it has no scan points"] if skin > SKIN else []
-        words += [f"{rim:.0%} of its rim lies beside skin that the scan does not show"] if rim >= RIM else []
-        text = f"{' and '.join(words)}: the damage may go on there"
+        words += [f"{rim:.0%} of its rim lies beside unseen skin"] if rim >= RIM else []
+        text = f"{' and '.join(words)}: the damage may continue there"
         yield Reason(self.code, text, "open", None if is_open else beside, f"{scan.unit}³", remedy=self.remedy)

@@ -16,7 +16,7 @@ here: a pocket found 13 % too large, mostly beside its rim, has 0.005."""
 
 class BeyondPointsRule(Rule):
     code = "beyond_points"
-    meaning = "the volume holds more than the scan points on its surface show: it bulges between them or beyond them"
+    meaning = "the volume bulges between or beyond the scan points on its surface"
     threshold = f"{ASKED:.0%} of the volume is reported; more than {CONTRADICTED:.0%} contradicts it"
     remedy = "scan this place more densely"
 

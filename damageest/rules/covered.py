@@ -10,11 +10,11 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 
 class Covered(Rule):
     code = "covered"
-    meaning = "surplus lies on the skin of the site: whether more is lost under it cannot be seen"
+    meaning = "surplus covers the skin of the site: a loss below it cannot be seen"
     threshold = "points of the surplus within two tolerances, or 1.5 spacings, of the site's points"
-    remedy = "remove the surplus, as a weld bead or dirt, and scan again"
+    remedy = "remove the surplus (weld bead, dirt) and scan again"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number, area in site.covered:
-            text = f"surplus {number} lies on its skin: whether more is lost under it cannot be seen"
+            text = f"surplus {number} covers its skin: a loss below it cannot be seen"
             yield Reason(self.code, text, "open", area * site.deepest, f"{scan.unit}³", remedy=self.remedy)

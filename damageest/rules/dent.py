@@ -17,7 +17,7 @@ class Dent(Rule):
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.bent_wall:
             text = (
-                f"it may be a dent, metal that moved and is not lost: it fades out without an edge, in a wall "
-                f"{site.bent_wall:.3g} {scan.unit} thick whose other side the scan does not show"
+                f"it may be a dent without lost metal: it has no edge, in a wall "
+                f"{site.bent_wall:.3g} {scan.unit} thick whose other side is unseen"
             )
             yield Reason(self.code, text, "widens", site.volume, f"{scan.unit}³", remedy=self.remedy)

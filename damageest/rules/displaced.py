@@ -16,8 +16,5 @@ class Displaced(Rule):
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number in site.displaced:
-            text = (
-                f"surplus {number} beside it is as large: a piece of the part may be displaced, or the part may be "
-                "bent, and no metal lost"
-            )
+            text = f"surplus {number} beside it is as large: a displaced piece or a bent part, without lost metal?"
             yield Reason(self.code, text, "contradicts", site.volume, f"{scan.unit}³", remedy=self.remedy)

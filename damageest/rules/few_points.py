@@ -14,14 +14,14 @@ FEW, TOO_FEW = 100, 12
 class FewPoints(Rule):
     code = "few_points"
     meaning = "few scan points lie on the site"
-    threshold = f"fewer than {FEW}; with fewer than {TOO_FEW}, they may all be stray"
+    threshold = f"fewer than {FEW}; with fewer than {TOO_FEW}, all may be stray"
     remedy = "scan this place more densely"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.by_rays or site.count >= FEW:
             return
-        text = f"only {site.count} scan points lie on it"
+        text = f"only {site.count} scan points"
         if site.count < TOO_FEW:
-            yield Reason(self.code, f"{text}: they may all be stray", "contradicts", site.count, remedy=self.remedy)
+            yield Reason(self.code, f"{text}: all may be stray", "contradicts", site.count, remedy=self.remedy)
         else:
             yield Reason(self.code, text, "widens", site.count, remedy=self.remedy)

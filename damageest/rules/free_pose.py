@@ -16,9 +16,9 @@ which metal is lost and not only how much."""
 
 class FreePoseRule(Rule):
     code = "free_pose"
-    meaning = "the scan can be moved without leaving unworn skin, and the volume changes with it"
+    meaning = "unworn skin does not fix the pose, and the volume changes with it"
     threshold = f"{TOLD:.0%} of the volume; from {OTHER_METAL:.0%} of other metal on the poses contradict each other"
-    remedy = "name faces that are not worn in align.datum"
+    remedy = "name unworn faces in align.datum"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for one in site.free:

@@ -20,7 +20,7 @@ the whole surface of the damage volume, since the root of a thin wall is small."
 
 class InnerSurface(Rule):
     code = "inner_surface"
-    meaning = "part of the inner surface has no scan points near: the loss may be deeper there"
+    meaning = "part of the inner surface has no scan points: the loss may be deeper there"
     threshold = (
         f"{BARE:.0%} of it, or {GAP:g} squares of the spacing in one piece; above twice either the upper end is open"
     )
@@ -40,7 +40,7 @@ class InnerSurface(Rule):
         if is_told:
             of = "the surface of the damage volume" if site.by_rays else "its inner surface"
             text = (
-                f"{share:.0%} of {of} has no scan points near, {evidence.ids_gap:.3g} {unit}² in one piece: it may be "
+                f"{share:.0%} of {of} has no scan points, {evidence.ids_gap:.3g} {unit}² in one piece: the loss may be "
                 "deeper there"
             )
             amount = None if is_open else inside

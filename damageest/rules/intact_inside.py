@@ -19,7 +19,7 @@ class IntactInside(Rule):
         if not {"inside", "contradicted"} & set(evidence.causes):
             return
         text = (
-            f"{evidence.intact_points_inside} intact points lie on the skin that it removes, on "
+            f"{evidence.intact_points_inside} intact points lie on the removed skin, on "
             f"{evidence.skin_contradicted:.0%} of it"
         )
         yield Reason(self.code, text, "contradicts", evidence.skin_contradicted, remedy=self.remedy)

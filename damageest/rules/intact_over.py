@@ -29,8 +29,8 @@ class IntactOver(Rule):
         share = site.evidence.intact_share
         if site.by_rays or share <= UNCLEAR:
             return
-        text = f"intact points lie on {share:.0%} of the skin that it removes"
+        text = f"intact points lie on {share:.0%} of the removed skin"
         if share > (AGAINST_IF_DEEP if site.typical > DEEP * scan.tolerance else AGAINST):
             yield Reason(self.code, text, "contradicts", share, remedy=self.remedy)
         else:
-            yield Reason(self.code, f"{text}: its rim is not clear", "open", share, remedy=self.remedy)
+            yield Reason(self.code, f"{text}: the rim is unclear", "open", share, remedy=self.remedy)

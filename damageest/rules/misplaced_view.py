@@ -13,17 +13,14 @@ AGAINST = 0.5
 
 class MisplacedView(Rule):
     code = "misplaced_view"
-    meaning = (
-        "views lie apart where they overlap, and the site lies in one that was not moved: put right, it shows the skin "
-        "there, or what it shows there does not say how far it is off"
-    )
+    meaning = "a misplaced view that was not moved explains the site"
     threshold = f"{AGAINST:.0%} of the site's points"
-    remedy = "align: register moves views; else register them to each other again, or scan more of what both show"
+    remedy = "register the views again, by align: register or in the scanner's software, or scan more of their overlap"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.misplaced > AGAINST:
             text = (
-                f"{site.misplaced:.0%} of its points are in a view that lies apart from the others, and that explains "
-                f"them: {site.typical:.3g} {scan.unit} deep"
+                f"{site.misplaced:.0%} of its points are in a misplaced view, which explains them: "
+                f"{site.typical:.3g} {scan.unit} deep"
             )
             yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)

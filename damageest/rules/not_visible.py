@@ -14,7 +14,7 @@ wall, taken for what is lost, all of it."""
 
 class NotVisible(Rule):
     code = "not_visible"
-    meaning = "in the part as it is left, the scanner could not have seen the inner surface: the other side may be lost"
+    meaning = "the scanner could not have seen this inner surface: the other side may be lost"
     threshold = (
         f"{CONTRADICTED:.0%} of the inner surface is closed in, or faces away from where the skin beside it was seen"
     )
@@ -29,5 +29,5 @@ class NotVisible(Rule):
             if site.shut > site.turned
             else "faces away from where the skin beside it was seen"
         )
-        text = f"{hidden:.0%} of its inner surface could not have been seen by the scanner: it {how}"
+        text = f"{hidden:.0%} of its inner surface was invisible to the scanner: it {how}"
         yield Reason(self.code, text, "contradicts", remedy=self.remedy)

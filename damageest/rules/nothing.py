@@ -25,17 +25,17 @@ def is_nothing(volume: float, interval: Interval, certain: float) -> bool:
 
 class Nothing(Rule):
     code = "nothing"
-    meaning = "the interval of the volume reaches down to nearly nothing: the site may be no loss"
+    meaning = "the interval reaches nearly nothing: the site may be no loss"
     threshold = (
         f"low end at most {NOTHING:.0%} of the volume, and no piece of {CERTAIN:.0%} of it lost in any case; or no "
         "interval"
     )
-    remedy = "see what makes its interval wide"
+    remedy = "scan this place again, or look at the part: accept the site or drop it"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.interval is None:
-            yield Reason(self.code, "no scan points lie on its inner surface, and its volume has no interval", "widens")
+            yield Reason(self.code, "no scan points on its inner surface, so no interval", "widens")
         elif is_nothing(site.volume, site.interval, site.uncertainty.certain if site.uncertainty else 0.0):
             low, high = site.interval
-            text = f"its volume is {low:.3g} to {high:.3g} {scan.unit}³: errors of scan, pose and form may explain it"
+            text = f"its volume is {low:.3g} to {high:.3g} {scan.unit}³: errors of scan, pose or form may explain it"
             yield Reason(self.code, text, "widens", low, f"{scan.unit}³")

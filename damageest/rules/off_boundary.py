@@ -18,5 +18,5 @@ class OffBoundary(Rule):
         if "residual" not in site.evidence.causes:
             return
         off = site.evidence.ids_residual
-        text = f"its boundary is off the damaged points (95 % within {off:.3g} {scan.unit})"
+        text = f"its boundary misses the damaged points (95 % within {off:.3g} {scan.unit})"
         yield Reason(self.code, text, "contradicts", off, scan.unit, remedy=self.remedy)

@@ -15,21 +15,20 @@ class OneMotion(Rule):
     code = "one_motion"
     meaning = "one motion brings the site's points, on several faces, back onto the skin: a view is misplaced"
     threshold = (
-        "what is left is the noise, in nine tenths of its points; a site of 5% of the scan's points or more. Other "
+        "the rest is noise, in nine tenths of its points; a site of 5% of the scan's points or more. Other "
         f"sites up to {ALIKE:g} times as deep may be of the same view"
     )
-    remedy = "register the views to each other again, or give them as a list of files, so that they can be compared"
+    remedy = "register the views again, or give them as a list of files"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.one_motion:
             text = (
-                f"its {site.count} points, {site.typical:.3g} {scan.unit} deep, lie on the skin after one motion of "
-                "all: a misplaced view explains the site"
+                f"its {site.count} points, {site.typical:.3g} {scan.unit} deep, fit the skin after one "
+                "motion: a misplaced view explains the site"
             )
             yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)
         elif 0 < site.typical < ALIKE * site.shifted:
             text = (
-                f"a misplaced view explains another site, {site.shifted:.3g} {scan.unit} deep: this one may be of the "
-                "same view"
+                f"a misplaced view explains another site, {site.shifted:.3g} {scan.unit} deep, and may explain this one"
             )
             yield Reason(self.code, text, "contradicts", site.shifted, scan.unit, remedy=self.remedy)

@@ -17,7 +17,7 @@ class Pieces(Rule):
     code = "pieces"
     meaning = "a piece of the site is certain, and an apron around it is not"
     threshold = f"low end at most {APRON:.0%} of the volume, and 5 % of its points {UNEVEN:g} times deeper than half"
-    remedy = "a larger tolerance takes the piece that is certain alone"
+    remedy = "a larger tolerance keeps the certain piece alone"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         certain = site.uncertainty.certain if site.uncertainty else 0.0
@@ -27,5 +27,5 @@ class Pieces(Rule):
         if low > APRON * site.volume or site.deepest < UNEVEN * site.typical:
             return
         more = site.volume - low
-        text = f"{low:.3g} {scan.unit}³ of it are certain, {more:.3g} more perhaps, where it is shallow"
+        text = f"{low:.3g} {scan.unit}³ are certain, up to {more:.3g} more in its shallow part"
         yield Reason(self.code, text, "widens", more, f"{scan.unit}³", remedy=self.remedy)

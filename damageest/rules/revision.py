@@ -10,14 +10,14 @@ from damageest.rules import Rule, ScanFacts, SiteFacts
 
 class Revision(Rule):
     code = "revision"
-    meaning = "metal of the same shape is added elsewhere: the part may be of another revision, where a feature moved"
+    meaning = "metal of the same shape is added elsewhere: another revision with a moved feature?"
     threshold = "volumes within 10 %, and extents (principal radii of gyration) within 12 %"
     remedy = "compare the scan with the drawing of the part's revision; accept the site if the loss is real"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number in site.twins:
             text = (
-                f"surplus {number} has the same shape: another revision of the part, in which a feature lies "
-                "elsewhere, may have been scanned, and no metal lost"
+                f"surplus {number} has the same shape: the scan may show another revision with a moved "
+                "feature, without lost metal"
             )
             yield Reason(self.code, text, "contradicts", site.volume, f"{scan.unit}³", remedy=self.remedy)

@@ -24,7 +24,7 @@ class Scattered(Rule):
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.shallow >= MANY and site.deepest < SHALLOW * scan.tolerance:
             text = (
-                f"it is one of {site.shallow} sites of its size or more, no deeper than {SHALLOW:g} tolerances: waves "
-                "of the part's form or of the scanner may explain them"
+                f"one of {site.shallow} sites of its size, no deeper than {SHALLOW:g} tolerances: waves of part or "
+                "scanner may explain them"
             )
             yield Reason(self.code, text, "contradicts", site.shallow, remedy=self.remedy)

@@ -12,19 +12,19 @@ TOLD = 0.05
 LARGE = 1 / 3
 """Half-width that a cause gives by itself, as a share of the largest one, from which it is named."""
 CAUSES = {
-    "form": ("intact skin that deviates over whole areas", "find out whether the part is bent, or the scan scaled"),
-    "outward": ("skin that lies as far outside the part", "find out whether the pose is wrong, or the scan scaled"),
-    "views": ("views that differ where they overlap", "register the views to each other again"),
+    "form": ("deviating intact skin", "check whether the part is bent, or the scan scaled"),
+    "outward": ("skin as far outside the part", "check pose and scale of the scan"),
+    "views": ("disagreeing views", "register the views again"),
     "adapt": (
-        "the field that the part was adapted by",
-        "scan more of the intact skin beside it, or give a datum or a second part of its type",
+        "adaptation of the part",
+        "scan more intact skin beside it, or give a datum or a second part of its type",
     ),
-    "pose": ("the fitted pose", "scan more of the intact skin, or name unworn faces in align.datum"),
-    "rim": ("where the inner surface meets the skin", "a smaller tolerance, if the noise allows it"),
-    "spacing": ("the gaps between the points", "scan this place more densely"),
-    "noise": ("the noise of the points", "scan with less noise, or more often"),
+    "pose": ("pose", "scan more intact skin, or name unworn faces in align.datum"),
+    "rim": ("rim", "a smaller tolerance, if the noise allows it"),
+    "spacing": ("gaps between the points", "scan this place more densely"),
+    "noise": ("noise", "scan with less noise, or several times"),
     "tessellation": (
-        "triangles in place of the CAD surface, or the surface of an earlier scan",
+        "triangles of part or earlier scan",
         "a finer part.chord, or a denser earlier scan",
     ),
 }
@@ -33,7 +33,7 @@ CAUSES = {
 
 class Terms(Rule):
     code = "wide_interval"
-    meaning = "causes that have a size make the interval of the volume wide; result.json has each under uncertainty"
+    meaning = "quantifiable errors make the interval wide; result.json has each under uncertainty"
     threshold = f"a half-width of {TOLD:.0%} of the volume; causes of a third of the largest one are named"
     remedy = "that of the largest cause, which the reason names"
 
@@ -47,12 +47,12 @@ class Terms(Rule):
         told = sorted((name for name in halves if halves[name] > LARGE * most), key=lambda name: -halves[name])
         if not told:  # what makes it wide is told by other rules: free motions, what is not seen
             return
-        words = [f"±{halves[name]:.3g} by {self._name(name, scan)}" for name in told]
-        text = f"its volume is uncertain, in {scan.unit}³: {', '.join(words)}"
+        words = [f"±{halves[name]:.3g} {scan.unit}³ ({self._name(name, scan)})" for name in told]
+        text = f"its volume is uncertain by {', '.join(words)}"
         yield Reason(self.code, text, "widens", halves[told[0]], f"{scan.unit}³", remedy=CAUSES[told[0]][1])
 
     def _name(self, cause: str, scan: ScanFacts) -> str:
         words = CAUSES[cause][0]
         if cause == "form" and scan.fit is not None and scan.fit.model != "ok":
-            return f"{words} ({scan.fit.name})"
+            return f"{words}: {scan.fit.name}"
         return words

@@ -28,14 +28,12 @@ def explains(own: float, depth: float, share: float, apart: float) -> bool:
 
 class TwoSheets(Rule):
     code = "two_sheets"
-    meaning = (
-        "over the same skin the scan shows two surfaces, one on the skin and one below it: views do not fit together"
-    )
+    meaning = "the scan shows two surfaces over the same skin: views do not fit together"
     threshold = (
         f"{AGAINST:.0%} of the site's points; or {OF_SCAN:.1%} of the scan's, for sites no deeper than {EXPLAINED:g} "
         "distances of the two"
     )
-    remedy = "register the views to each other again, or give them as a list of files, so that they can be compared"
+    remedy = "register the views again, or give them as a list of files"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         share, apart = scan.sheets_share, scan.sheets_apart
@@ -43,13 +41,13 @@ class TwoSheets(Rule):
             return
         if site.two_sheets > AGAINST:
             text = (
-                f"{site.two_sheets:.0%} of its points lie below others on intact skin, by {site.typical:.3g} "
-                f"{scan.unit}: the scan shows two surfaces there, and views may not fit together"
+                f"{site.two_sheets:.0%} of its points lie {site.typical:.3g} {scan.unit} below others on "
+                "intact skin: two surfaces, probably of views that do not fit together"
             )
             yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)
         else:
             text = (
-                f"at {share:.1%} of the scan's points it shows two surfaces, {apart:.3g} {scan.unit} apart: views may "
-                "not fit together, and one of them explains the site"
+                f"at {share:.1%} of its points the scan shows two surfaces, {apart:.3g} {scan.unit} apart: a "
+                "misplaced view explains the site"
             )
             yield Reason(self.code, text, "contradicts", apart, scan.unit, remedy=self.remedy)

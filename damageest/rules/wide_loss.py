@@ -18,12 +18,12 @@ ELSEWHERE = 0.5
 
 class WideLoss(Rule):
     code = "wide_loss"
-    meaning = "a shallow loss covers much of the skin, and in a pose nearby it lies on other skin"
+    meaning = "a shallow loss covers much of the skin, and lies on other skin in a nearby pose"
     threshold = (
         f"more than {WIDE:.0%} of the seen skin, half of it shallower than {THIN:g} tolerances, and {ELSEWHERE:.0%} of "
         "its depth explained by a motion that puts no skin outside"
     )
-    remedy = "name faces that are not worn in align.datum; where the pose is known, give it to align: none"
+    remedy = "name unworn faces in align.datum, or give a known pose by align: none"
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if not scan.is_fitted or site.area <= WIDE * scan.seen_area or site.typical >= THIN * scan.tolerance:
@@ -33,8 +33,7 @@ class WideLoss(Rule):
         # a part that is worn all over shows no skin where its CAD has it
         share = f"{site.area / scan.seen_area:.0%} of the skin" if scan.seen_area > 0 else "all skin"
         text = (
-            f"it covers {share} that the scan shows, {site.typical:.3g} {scan.unit} deep, and the pose was fitted to "
-            f"the scan: a motion that puts no skin outside explains {site.elsewhere:.0%} of it, and the loss may lie "
-            "elsewhere"
+            f"it covers {share} seen, {site.typical:.3g} {scan.unit} deep: a small motion of the scan explains "
+            f"{site.elsewhere:.0%} of it, and the loss may lie elsewhere"
         )
         yield Reason(self.code, text, "contradicts", site.typical, scan.unit, remedy=self.remedy)

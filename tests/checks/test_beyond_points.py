@@ -55,7 +55,7 @@ def test_more_than_skin_times_depth_is_contradicted() -> None:
     points = scan(block() - pocket(DEPTH))
     found = ask(pocket(5.0), pocket(DEPTH), points)
     assert found.is_contradicted
-    assert "the skin under it times the depth" in found.reason
+    assert "exceeds lost skin times depth" in found.reason
 
 
 def test_added_metal_is_asked_as_well() -> None:

@@ -252,8 +252,8 @@ JOBS: dict[str, tuple[str, str]] = {
     "nobody's home": ("part: ~nobody_at_all/box.stl", "there is no such file"),
     "a name that leaves the folder": ("name: ../../x", "name"),
     "a name that is the folder above": ("name: ..", "do not name a folder"),
-    "a tolerance of 1e-300": ("tolerance: 1e-300", "cannot be used for a part"),
-    "a tolerance of 1e300": ("tolerance: 1e300", "cannot be used for a part"),
+    "a tolerance of 1e-300": ("tolerance: 1e-300", "does not fit a part"),
+    "a tolerance of 1e300": ("tolerance: 1e300", "does not fit a part"),
     "more than a megabyte": ("#" * 2_000_000, "larger than"),
 }  # fmt: skip
 

@@ -15,7 +15,7 @@ TOLD = 0.5
 """Depth, in tolerances, from which what another field would do to the skin is told."""
 OPEN = 2.5
 """What a field leaves in half of the patches, in mean squares of the noise, from which another may be as right."""
-DECIDES = "unworn faces in align.datum, or a second part of its type, would decide"
+DECIDES = "name unworn faces in align.datum, or give a second part of its type"
 
 
 class Thinned(NamedTuple):
@@ -55,15 +55,15 @@ def describe_other(thinned: Thinned, is_open: bool, unit: str) -> str:
         f"a part that was made up to {thinned.depth:.3g} {unit} thinner over {thinned.area:.3g} {unit}² "
         f"({thinned.volume:.3g} {unit}³) would look like loss there"
     )
-    taken = "both volumes are in the intervals" if is_open else "it is taken for loss, since no metal stands out for it"
+    taken = "both volumes are in the intervals" if is_open else "treated as material loss: no matching bulge"
     return f"{words}: {taken}; {DECIDES}"
 
 
 def describe_hidden(thinned: Thinned, unit: str) -> str:
     """What is said of skin that the field made thinner."""
     return (
-        f"the field makes the part up to {thinned.depth:.3g} {unit} thinner over {thinned.area:.3g} {unit}² "
-        f"({thinned.volume:.3g} {unit}³): wear of that depth would look the same, and is not counted; {DECIDES}"
+        f"the adapted part is up to {thinned.depth:.3g} {unit} thinner over {thinned.area:.3g} {unit}² "
+        f"({thinned.volume:.3g} {unit}³), which may hide wear; {DECIDES}"
     )
 
 
@@ -75,6 +75,6 @@ def measure_unknown(modes: Floats, normals: Floats) -> float:
 def describe_unknown(error: float, tolerance: float, unit: str) -> str:
     """What is said of skin that no point shows, and that the field does not predict."""
     return (
-        f"where no intact skin shows it, the adapted skin is known within ±{2 * error:.3g} {unit} (95 %), not within "
-        f"the tolerance of {tolerance:.3g} {unit}: scan more beside it, or give a second part of its type"
+        f"unseen adapted skin is known within ±{2 * error:.3g} {unit} (95 %), tolerance {tolerance:.3g} {unit}; scan "
+        "more beside it, or give a second part of its type"
     )

@@ -13,14 +13,15 @@ def describe(adapted: AdaptedPart, tolerance: float) -> str:
     unit = adapted.part.unit
     by = f"a lattice of {' x '.join(map(str, adapted.lattice))} cells" if any(adapted.lattice) else "a cubic polynomial"
     words = (
-        f"the part as designed was deformed by up to {adapted.amount:.3g} {unit} (rms {adapted.rms:.3g}) to follow the "
-        f"scan, by {by}, with a strain of at most {100 * adapted.strain:.2g} %; this explains held-out patches better "
-        f"by {100 * adapted.gain:.0f} %"
+        f"the CAD part was deformed by up to {adapted.amount:.3g} {unit} (rms {adapted.rms:.3g}) to follow the scan, "
+        "by "
+        f"{by}, strain at most {100 * adapted.strain:.2f} %; held-out patches fit better by {100 * adapted.gain:.0f} %"
     )
     if abs(adapted.growth) > TOLD:
         words += (
-            f"; its scale changed by {100 * adapted.growth:+.2g} %, or that of the scan (scan.scale: auto corrects it)"
+            f"; part or scan changed scale by {100 * adapted.growth:+.2g} %: measure a length (scan.scale: auto "
+            "corrects the scan)"
         )
         if adapted.growth < 0:
-            words += "; wear of that depth all over the part would look like it"
+            words += "; even wear would look the same"
     return words

@@ -64,7 +64,7 @@ def find_loose_motions(frame: Frame, pose: Floats, points: Floats, band: float, 
             one = to_free_motion(frame, twist, ends[0], ends[1], unit)
             text = (
                 f"the scan does not fix the pose for {name_motion(one)}, from {one.low:.3g} to {one.high:+.3g} {unit}: "
-                "it fits as well, because the surface that would prevent it is missing, worn or was not seen; "
+                "the surface that would fix it is missing, worn or unseen; "
                 f"{REMEDY}"
             )
             found.append(replace(one, text=text))
@@ -99,12 +99,11 @@ def describe_choice(choice: Choice) -> tuple[str, ...]:
     if choice.axis is not None:
         x, y, z = choice.axis.direction + 0.0
         return (
-            f"the part fits at any angle about the axis ({x:.3f}, {y:.3f}, {z:.3f}) of its own frame "
-            "(continuous symmetry): the pose is one of infinitely many correct ones; the alternatives list quarter "
-            "turns",
+            f"the part fits at any angle about the axis ({x:.2f}, {y:.2f}, {z:.2f}): every turn is correct, and the "
+            "machine has to use this one; the alternatives list quarter turns",
         )
     if len(choice.others):
-        return (f"the part fits in {len(choice.others) + 1} poses equally well; the others are listed as alternatives",)
+        return (f"the part fits in {len(choice.others) + 1} poses equally well: the machine has to use this one",)
     return ()
 
 
@@ -125,8 +124,7 @@ def note_ambiguity(choice: Choice, part: PreparedPart) -> tuple[Reason, ...]:
     if apart <= 0.002:
         return ()
     text = (
-        f"the poses that fit are not all symmetries of the part (up to {apart:.1%} of its surface differs): the "
-        "surface that would distinguish them is missing, was not seen, or does so by no more than the errors of the "
-        "scan, so the damage found depends on the pose"
+        f"poses fit that are no symmetries of the part ({apart:.1%} of its surface differs): the damage found depends "
+        "on the pose, and the surface that would tell is missing, unseen or too alike"
     )
     return (Reason("other_poses", text, "contradicts", apart, remedy=REMEDY),)

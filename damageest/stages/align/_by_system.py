@@ -170,8 +170,7 @@ def _doubt_outside(frame: Frame, patches: Patches, band: Floats, tolerance: floa
         return ()
     amount = float(np.median(patches.offset[out])) * frame.size
     text = (
-        f"in the pose that the datums give, {share:.0%} of the skin lies outside the part, by {amount:.3g} {unit}: no "
-        "wear explains that, but a worn datum does"
+        f"in the pose of the datums, {share:.0%} of the skin lies {amount:.3g} {unit} outside the part: a datum is worn"
     )
     return (Reason("datum_worn", text, "contradicts", amount, unit, remedy=REMEDY),)
 
@@ -191,10 +190,7 @@ def _tell_decided(frame: Frame, patches: Patches, noise: float, tolerance: float
     if not decided:
         decided = [to_free_motion(frame, patches.basis @ better / moved, 0.0, moved, unit)]
     named = "; ".join(f"{name_motion(one)} from {one.low:.3g} to {one.high:+.3g} {unit}" for one in decided)
-    text = (
-        f"the datums decide between poses in which the scan fits as well: {named}; if a datum is worn, it is other "
-        "metal that is lost"
-    )
+    text = f"the datums decide between equally good poses: {named}; if a datum is worn, other metal is lost"
     amount = max(max(-one.low, one.high) for one in decided)
     return (Reason("datum_decides", text, "note", amount, unit),)
 
@@ -212,10 +208,7 @@ def _doubt_open(frame: Frame, patches: Patches, free: Floats) -> tuple[Reason, .
     moved = np.linalg.svd(rows @ unseen / np.sqrt(SAMPLES), compute_uv=False)
     if moved.max() < OPEN:
         return ()
-    text = (
-        "neither the datums nor the rest of the skin fix the pose: the part can be moved or turned and fits as well, "
-        "because the surface that would prevent it is missing or was not seen"
-    )
+    text = "neither the datums nor other skin fix the pose: the surface that would fix it is missing or unseen"
     return (Reason("pose_free", text, "contradicts", remedy="name more datums in align.datum, or scan more"),)
 
 

@@ -70,13 +70,13 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
             f"in the given pose {given.on:.0%} of the scan lies on the part; moved by {shift:.3g} {part.unit} and "
             f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that "
             "much, or the part is bent or twisted, or the scale of the scan is wrong",
-            "use align: icp, which corrects it, or give the right T_part_scan",
+            "use align: icp, or give the right T_part_scan",
             topic="pose",
         )
     if not given.is_acceptable:
         raise StageError(
             f"the scan does not lie on the part in the given pose: {given.describe()}",
-            "give the right T_part_scan, or use align: register, which needs none; check unit and part as well",
+            "use align: register, or give the right T_part_scan; check unit and part",
             topic="pose",
         )
     doubts = given.note_doubts()

@@ -77,10 +77,7 @@ class PoseCheck:
         """A doubt where the pose is acceptable, but little of the scan agrees with the part."""
         if self.agreement >= DOUBTFUL_AGREEMENT:
             return ()
-        text = (
-            f"only {self.agreement:.0%} of the scan near the part lies on its surface in the pose: it may show another "
-            "part, or another revision of it"
-        )
+        text = f"only {self.agreement:.0%} of the scan near the part lies on it: another part or revision?"
         return (Reason("another_part", text, "contradicts", self.agreement),)
 
     def build_error(self, remedy: str) -> StageError:

@@ -44,30 +44,26 @@ def describe_system(frame: Frame, system: DatumSystem, fits: Fits, free: Floats,
         name = f"datum {feature.name} ({feature.kind})"
         datums.append(_summarise(frame, feature, fitted, radii, unit))
         if not taken.shape[1]:
-            notes.append(
-                f"{name} fixes nothing: those before it fix all that it could, as of two parallel planes; it has no "
-                "effect on the pose"
-            )
+            notes.append(f"{name} has no effect: earlier datums fix all that it could, like parallel planes")
         if fitted.weak.shape[1]:
             named = _join(frame, fitted.weak, unit)
-            notes.append(f"{name}: what the scan shows of it does not fix {named}; it is taken as free")
+            notes.append(f"{name}: its scanned part does not fix {named}, which counts as free")
         depth = fitted.off * frame.size
         if fitted.contact < MIN_CONTACT:
             text = (
-                f"{name}: only {fitted.contact:.0%} of its points lie on one shape in the place that those before it "
-                "allow: it is worn, or it is not in its place"
+                f"{name}: only {fitted.contact:.0%} of its points lie on one shape where earlier datums allow it: "
+                "worn, or misplaced"
             )
             doubts.append(Reason("datum_worn", text, "contradicts", fitted.contact, remedy=REMEDY))
         elif fitted.inside > TOLD:
             notes.append(
-                f"{name}: {fitted.inside:.0%} of its points lie below the shape of the others, by up to {depth:.3g} "
-                f"{unit}: they are taken as worn and do not count"
+                f"{name}: {fitted.inside:.0%} of its points lie up to {depth:.3g} {unit} below its shape and count "
+                "as worn"
             )
     if free.shape[1]:
         many = f"{free.shape[1]} degrees" if free.shape[1] > 1 else "1 degree"
         notes.append(
-            f"the datums leave {many} of freedom: {_join(frame, free, unit)}; "
-            "the rest of the skin fixes what is no symmetry of the part"
+            f"the datums leave {many} of freedom: {_join(frame, free, unit)}; other skin fixes all but symmetries"
         )
     return Told(tuple(datums), tuple(notes), tuple(doubts))
 

@@ -204,9 +204,8 @@ def _shows_symmetric(test: MirrorTest, best: Fit, mirrored: Fit) -> bool:
 
 def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
     text = (
-        f"{mirrored.agreement:.0%} of what the scan shows near the part would lie on its surface if it were mirrored, "
-        f"{check.agreement:.0%} does in the best pose: it may show a mirror image of the part; it covers only "
-        f"{check.cover:.0%} of the part's surface, which is too little to tell"
+        f"{mirrored.agreement:.0%} of the scan near the part would lie on its surface if it were mirrored, "
+        f"{check.agreement:.0%} does now: it may show a mirrored part, but covers only {check.cover:.0%} of the surface"
     )
     return Reason("mirrored", text, "contradicts", mirrored.agreement, remedy="scan more of the part")
 

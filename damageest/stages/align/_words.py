@@ -48,7 +48,7 @@ def describe_open(frame: Frame, patches: Patches, datum: Flags, unit: str) -> tu
     named = "; ".join(
         name_motion(to_free_motion(frame, one, 0.0, 0.0, unit)) for one in simplify(left @ patches.basis.T)
     )
-    return (f"the datum does not fix {named}: the rest of the skin fixes it",)
+    return (f"the datum does not fix {named}; other skin does",)
 
 
 def simplify(twists: Floats) -> Floats:
@@ -85,27 +85,27 @@ def _orient(vector: Floats, low: float, high: float) -> tuple[Vector, float, flo
 def name_motion(motion: FreeMotion) -> str:
     x, y, z = motion.direction
     if motion.point is None:
-        return f"a shift along ({x:.3f}, {y:.3f}, {z:.3f})"
+        return f"a shift along ({x:.2f}, {y:.2f}, {z:.2f})"
     a, b, c = motion.point
-    return f"a turn about ({x:.3f}, {y:.3f}, {z:.3f}) through ({a:.4g}, {b:.4g}, {c:.4g})"
+    return f"a turn about ({x:.2f}, {y:.2f}, {z:.2f}) through ({a:.3g}, {b:.3g}, {c:.3g})"
 
 
 _REMEDY = (
-    "so that it is open which of the opposite faces is worn; name faces that are not worn in align.datum, or give the "
-    "pose to align: none"
+    "and either of two opposite faces may be worn; name unworn faces in align.datum, or give a known pose by "
+    "align: none"
 )
 
 
 def _describe_shift(direction: Vector, low: float, high: float, unit: str) -> str:
     return (
-        f"the pose is free for {name_motion(FreeMotion(direction, low, high))} of the part's frame, from {low:.3g} to "
-        f"{high:+.3g} {unit}: no unworn skin holds it there, {_REMEDY}"
+        f"the pose is free for {name_motion(FreeMotion(direction, low, high))}, from {low:.3g} to {high:+.3g} {unit}: "
+        f"no unworn skin fixes it, {_REMEDY}"
     )
 
 
 def _describe_turn(direction: Vector, point: Vector, low: float, high: float, unit: str) -> str:
     named = name_motion(FreeMotion(direction, low, high, point))
     return (
-        f"the pose is free for {named} of the part's frame, by which the skin "
-        f"moves from {low:.3g} to {high:+.3g}: no unworn skin holds it there, {_REMEDY}"
+        f"the pose is free for {named}, which moves the skin from {low:.3g} to {high:+.3g} {unit}: no unworn skin "
+        f"fixes it, {_REMEDY}"
     )

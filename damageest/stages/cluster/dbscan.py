@@ -77,13 +77,12 @@ class Dbscan(Cluster):
         notes = []
         if noise > LEFT_OUT * len(damage):
             notes.append(
-                f"damaged points nearer than {eps:.4g} to each other are grouped (eps, {why}; {dense} neighbours): "
-                f"{noise} of {len(damage)} are in no group"
+                f"{noise} of {len(damage)} damaged points are in no site (eps {eps:.3g}: {why}; {dense} neighbours); "
+                "raise cluster.eps if damage is missed"
             )
         if eps < bridging / 2:
             notes.append(
-                f"eps is shorter than the distance that bridges the gaps of the scan ({bridging:.4g}): damage sites "
-                "may be split or missed; use a larger eps"
+                f"cluster.eps is below the gaps of the scan ({bridging:.3g}): sites may be split or missed; raise it"
             )
         return Sites(label, len(order), tuple(notes))
 

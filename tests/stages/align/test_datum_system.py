@@ -151,7 +151,7 @@ def test_a_datum_that_is_worn_in_part_is_fitted_to_the_rest() -> None:
     points[worn, 2] += 2.5 * scene.tolerance
     pose = Scene(CUBOID, type(scene.scan)(points, noise=scene.scan.noise), scene.tolerance).align(LEFT["3-2-1"][1])
     assert measure_pose_error(CUBOID, pose.T_part_scan, np.eye(4))[1] < 0.3 * scene.scan.noise
-    assert any("datum A" in note and "taken as worn" in note for note in pose.notes)
+    assert any("datum A" in note and "count as worn" in note for note in pose.notes)
     assert 0.2 < pose.datums[0].inside < 0.6
 
 
@@ -205,7 +205,7 @@ def test_a_datum_that_the_scan_does_not_show(share: float) -> None:
             seen.align({"A": BOTTOM})
         return
     pose = seen.align({"A": BOTTOM})
-    assert any("what the scan shows of it does not fix a turn about (1.000" in note for note in pose.notes)
+    assert any("its scanned part does not fix a turn about (1.00" in note for note in pose.notes)
     assert name_motions(pose) == "turn x, turn z, shift x, shift y"
     assert measure_pose_error(CUBOID, pose.T_part_scan, np.eye(4))[1] < 0.3 * scene.scan.noise
 

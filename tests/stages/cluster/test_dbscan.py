@@ -69,7 +69,7 @@ def test_sites_are_numbered_by_size_and_repeat() -> None:
     for site, true in ((1, 2), (2, 3), (3, 1)):
         assert np.bincount(pit[sites.members(site)], minlength=4).argmax() == true
     assert np.array_equal(Dbscan().run(scan, deviation, TOLERANCE).label, sites.label)
-    assert "in no group" in sites.notes[0]
+    assert "are in no site" in sites.notes[0]
 
 
 def test_uneven_density_leaves_one_damage_whole() -> None:

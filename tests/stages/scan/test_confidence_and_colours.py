@@ -87,7 +87,7 @@ def test_files_with_and_without(tmp_path: Path) -> None:
     assert (scan.colours == [[128] * 3] * 200 + COLOURS[second][kept].tolist()).all()
     assert np.isnan(scan.confidence[:200]).all()
     assert (scan.confidence[200:] == CONFIDENCE[second][kept]).all()
-    assert "200 points of other files have none, and are used" in scan.warnings[0].text
+    assert "200 points without confidence are used" in scan.warnings[0].text
 
 
 def test_the_same_of_a_scan_that_is_read_in_pieces(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
