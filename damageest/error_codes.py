@@ -24,9 +24,9 @@ class ErrorCode:
 
 ERROR_CODES: dict[str, ErrorCode] = {
     "job": ErrorCode(
-        "the job file is not valid: each fault is named with its line, and what would be valid",
+        "the job file is not valid: each fault has its line and the valid choices",
         2,
-        "Correct the lines that are named; `damageest validate` checks a job and computes nothing.",
+        "Correct these lines; `damageest validate` checks a job and computes nothing.",
         "docs/job-reference.md",
     ),
     "option": ErrorCode(
@@ -36,88 +36,88 @@ ERROR_CODES: dict[str, ErrorCode] = {
         "docs/command-line.md",
     ),
     "part_file": ErrorCode(
-        "the file of the part cannot be read, or is no solid",
+        "the part file cannot be read, or is no solid",
         2,
         "Export the part again as a closed solid, as STEP, STL or 3MF.",
         "docs/your-own-scan.md#what-the-part-should-be",
     ),
     "scan_file": ErrorCode(
-        "the file of the scan cannot be read, or holds no points that can be used",
+        "the scan file cannot be read, or has no usable points",
         2,
         "Export the scan again, as PLY or E57, and compare its size with that in the scanner's software.",
         "docs/your-own-scan.md#how-to-export-from-the-scanners-software",
     ),
     "input": ErrorCode(
-        "a file, a folder, an array or a value that was given cannot be used",
+        "a given file, folder, array or value cannot be used",
         2,
         "Do what the message says.",
         "docs/your-own-scan.md",
     ),
     "cancelled": ErrorCode(
-        "the program that called damageest.run cancelled it",
+        "the calling program cancelled the run",
         1,
-        "Nothing: what stages had given is kept where the run had a cache or an output folder.",
+        "Nothing: finished stages are kept where the run had a cache or an output folder.",
         "docs/python.md",
     ),
     "output": ErrorCode(
-        "the output folder cannot be written, is used by another run, or holds files of others",
+        "the output folder cannot be written, is used by another run, or holds other files",
         2,
         "Make room, wait for the other run, or name another folder by `--output`. An earlier result is whole.",
         "docs/faults.md#the-output-folder",
     ),
     "result_folder": ErrorCode(
-        "a folder that was given is not one that a run wrote, or cannot be read as one",
+        "the folder is no output folder of a run",
         2,
         "Name the folder that `damageest run` prints last, or run the job again.",
         "docs/evidence-and-limits.md",
     ),
     "plugin": ErrorCode(
-        "a plugin does not keep its contract, is there twice, or needs what is not installed",
+        "a plugin breaks its contract, is installed twice, or lacks a dependency",
         2,
-        "`damageest plugins` says which and why; take another implementation, or report it to its authors.",
+        "`damageest plugins` says which and why. Take another implementation, or report it to its authors.",
         "docs/plugin-guide.md#when-it-does-not-work",
     ),
     "missing": ErrorCode(
-        "a Python package, a library of the system, OpenGL or a display is not there",
+        "a Python package, a system library, OpenGL or a display is missing",
         1,
-        "Install what is named; `damageest doctor` lists what is here and what is not.",
+        "Install what the message names; `damageest doctor` lists the rest.",
         "docs/install.md",
     ),
     "stage": ErrorCode(
-        "a stage failed, or refused what it was given: the message names stage, site and reason",
+        "a stage failed or refused its input: the message names stage, site and reason",
         1,
-        "Do what stands after `try:`.",
+        "Follow the line after `try:`.",
         "docs/stages.md",
     ),
     "memory": ErrorCode(
-        "a computation needs more memory than is free, or ran out of it",
+        "a computation needs more memory than is free",
         1,
-        "Take a larger tolerance, fewer points (`scan.most_points`), or give it more by `--memory`. Where a file is "
-        "too large to be read, the exit status is 2.",
+        "Take a larger tolerance or fewer points (`scan.most_points`), or raise `--memory`. For a file that is too "
+        "large to be read, the exit status is 2.",
         "docs/faults.md#memory",
     ),
     "time_limit": ErrorCode(
-        "a stage took longer than its limit of time and was ended",
+        "a stage exceeded its time limit",
         1,
         "Raise `--stage-timeout`, or take another implementation.",
         "docs/batch.md#limits-of-memory-and-time",
     ),
     "crash": ErrorCode(
-        "the process of a stage ended by itself, as native libraries do that crash",
+        "the process of a stage crashed",
         1,
-        "Take another implementation, and report it with job and inputs. An earlier result is whole.",
+        "Take another implementation, and report the crash with job and inputs. An earlier result is whole.",
         "docs/batch.md#limits-of-memory-and-time",
     ),
     "faulty": ErrorCode(
-        "the code of a stage failed in a way that it does not foresee, or gave what its contract does not allow",
+        "the code of a stage failed unexpectedly, or broke its contract",
         1,
-        "Take another implementation, and report it to the authors of the package that is named.",
+        "Take another implementation, and report it to the authors of the named package.",
         "docs/plugin-guide.md#when-it-does-not-work",
     ),
     "not_accepted": ErrorCode(
-        "sites were found, and none of them is accepted as damage",
+        "no site is accepted as damage",
         1,
-        "Read their reasons; name those that are damage in the job, as `accept: [1]`.",
+        "Read the reasons, and accept damage in the job, for example `accept: [1]`.",
         "docs/verdicts.md",
     ),
     "unexpected": ErrorCode(
@@ -128,12 +128,12 @@ ERROR_CODES: dict[str, ErrorCode] = {
     ),
 }
 EXIT_STATUSES: dict[int, str] = {
-    0: "done; for `run` also where no damage was found, and where an extra for the report is not installed",
+    0: "done; also `run` without damage found, or without an extra for the report",
     1: "a stage failed or refused, no site is accepted, a site has no volume, a job of a batch is not `ok`, a "
     "tolerance is not met (`inspect`), or `verify` or `doctor` found a fault",
     2: "the command, the job or an input is not valid; no result was written for that job",
     130: "ended by Ctrl-C",
-    141: "who read the output closed it, as `head` does",
+    141: "broken pipe",
 }
 STAGE_PAGES = {
     "part": "docs/your-own-scan.md#what-the-part-should-be",
@@ -144,7 +144,7 @@ STAGE_PAGES = {
     "path": "docs/paths.md",
     "export": "docs/cam.md#files",
 }
-"""Pages about what a stage does, where there is one; of others, docs/stages.md."""
+"""Pages about the work of a stage, where there is one; of others, its page in docs/stages."""
 
 
 def name_code(error: BaseException) -> str:
@@ -162,7 +162,8 @@ def find_page(error: BaseException) -> str:
             if topic.word == word:
                 return topic.page
     if isinstance(error, StageError) and error.code == "stage":
-        return STAGE_PAGES.get(error.stage, ERROR_CODES["stage"].page)
+        own = f"docs/stages/{error.stage}.md" if error.stage else ERROR_CODES["stage"].page
+        return STAGE_PAGES.get(error.stage, own)
     return ERROR_CODES[name_code(error)].page
 
 

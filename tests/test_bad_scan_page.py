@@ -29,7 +29,7 @@ JOBS = ROOT / "jobs" / "bad_scans"
 FAST = {"unit", "confidence"}
 """Jobs that take a second or two; the others are run by -m slow only."""
 QUOTED = re.findall(r"^`jobs/bad_scans/(\w+)\.yaml` says:\n\n```text\n(.*?)^```$", PAGE, re.DOTALL | re.MULTILINE)
-STARTS = re.compile(r"\n(?=error: |note: |surplus |unseen: |tolerance: |fit: |losses |no damage )")
+STARTS = re.compile(r"\n(?=error: |note: |surplus |unseen: |tolerance: |fit: |smallest |no damage )")
 """Where a line of the program begins, in a block whose long lines are broken."""
 
 

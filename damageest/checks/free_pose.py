@@ -70,7 +70,7 @@ def describe_motion(motion: FreeMotion, unit: str) -> str:
     """The motion in a few words."""
     x, y, z = motion.direction
     kind = "a shift along" if motion.point is None else "a turn about"
-    return f"{kind} ({x:.3f}, {y:.3f}, {z:.3f}) from {motion.low:.3g} to {motion.high:+.3g} {unit}"
+    return f"{kind} ({x:.2f}, {y:.2f}, {z:.2f}) from {motion.low:.3g} to {motion.high:+.3g} {unit}"
 
 
 def compare_other_poses(damage: Solid, part: Part, pose: Pose, tolerance: float) -> float:

@@ -33,10 +33,12 @@ def command(
         int, typer.Option(min=0, help="Local processes, each with one job at a time. Default: one a core.")
     ] = 0,
     memory: Annotated[
-        str, typer.Option(metavar="SIZE", help="Memory that each job may allocate, as 6GB. Default: its share.")
+        str,
+        typer.Option(metavar="SIZE", help="Memory that each job may allocate, for example 6GB. Default: its share."),
     ] = "",
     scheduler: Annotated[
-        str, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, as tcp://host:8786.")
+        str,
+        typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, for example tcp://host:8786."),
     ] = "",
     out: Annotated[
         Path, typer.Option("--out", help="Folder for <name>/ of each job, batch.csv, batch.json, batch.html.")

@@ -125,7 +125,7 @@ def _list(entries: list[dict[str, Any]]) -> None:
         if one["kind"] in ("topic", "error"):
             mark = "error: " if one["kind"] == "error" else ""
             say(f"{one['word']:<14}{mark}{one['meaning']}")
-    say(f"{EXIT:<14}what the exit status of a command means")
+    say(f"{EXIT:<14}exit statuses of commands")
 
 
 def _wrap(text: str) -> str:

@@ -38,7 +38,10 @@ def command(
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only, no progress and no table.")] = False,
     memory: Annotated[
-        str, typer.Option(metavar="SIZE", help="Memory that the run may allocate, as 6GB. Default: what is free.")
+        str,
+        typer.Option(
+            metavar="SIZE", help="Memory that the run may allocate, for example 6GB. Default: the free memory."
+        ),
     ] = "",
     stage_timeout: Annotated[
         float, typer.Option(min=0, help="Seconds after which a stage is ended; 0: never.")

@@ -77,7 +77,7 @@ class Header(Options):
     )
     sites: SiteChoice = Field(SiteChoice(), description="sites to drop, to merge and to keep")
     sections: tuple[SectionChoice, ...] = Field(
-        (), description="sections of part and scan, as of blades and shafts, and depth of wear along lines"
+        (), description="sections of part and scan, for example of blades and shafts, and depth of wear along lines"
     )
     accept: Accept = Field(
         "likely",

@@ -34,7 +34,7 @@ class Certificate(Options):
         None, description="length measurement error: a number, or a constant plus a share of L; in the job's unit"
     )
     standard: str = Field(
-        "", max_length=80, description="the standard that they follow, as ISO 10360-13, ISO 10360-8 or VDI/VDE 2634-3"
+        "", max_length=80, description="their standard, for example ISO 10360-13, ISO 10360-8 or VDI/VDE 2634-3"
     )
     k: float | None = Field(
         None,
@@ -52,8 +52,8 @@ class Certificate(Options):
 class ScannerInfo(Options):
     """The scanner that made the scan."""
 
-    name: str = Field("", max_length=120, description="name and serial number, as the report is to have them")
-    certificate: Certificate | None = Field(None, description="what it may err by; default: not known")
+    name: str = Field("", max_length=120, description="name and serial number for the report")
+    certificate: Certificate | None = Field(None, description="maximum permissible errors; default: not known")
 
 
 class Temperature(Options):

@@ -18,20 +18,20 @@ contradicts the site."""
 
 POSE_CODES = {
     "another_part": "little of the scan near the part lies on its surface: it may show another part or revision",
-    "other_poses": "poses fit that are not symmetries of the part; it matters where other metal is lost in them",
-    "pose_free": "the part can be moved or turned a little and fits as well",
-    "mirrored": "the scan fits better mirrored, and shows too little of the part to tell",
-    "wrong_scale": "the scan lies on the part far better in another scale",
-    "datum_worn": "a datum is worn or not in its place: the datum system puts it, or the skin, elsewhere",
-    "datum_decides": "the scan fits as well in poses that the datum system excludes: it decides which metal is lost",
-    "given_pose": "in a pose nearby more of the scan lies on the part than in the given one",
+    "other_poses": "other poses fit that are no symmetries of the part",
+    "pose_free": "the pose is not fixed: small motions fit as well",
+    "mirrored": "the scan fits better mirrored, and shows too little to tell",
+    "wrong_scale": "the scan fits far better in another scale",
+    "datum_worn": "a datum is worn or misplaced",
+    "datum_decides": "the datums decide between equally good poses",
+    "given_pose": "a nearby pose fits better than the given one",
 }
 """Codes of the reasons that implementations of align give against their pose."""
 
 
 class PoseDoubt(Rule):
     code = "pose"
-    meaning = "the pose may be wrong, or other poses fit as well in which other metal is lost"
+    meaning = "the pose may be wrong, or another pose with other lost metal fits as well"
     threshold = (
         f"as the stage align says; where other poses fit, {DIFFERS:.0%} of the removed skin lies elsewhere in one"
     )

@@ -99,8 +99,8 @@ def describe_choice(choice: Choice) -> tuple[str, ...]:
     if choice.axis is not None:
         x, y, z = choice.axis.direction + 0.0
         return (
-            f"the part fits at any angle about the axis ({x:.2f}, {y:.2f}, {z:.2f}): every turn is correct, and the "
-            "machine has to use this one; the alternatives list quarter turns",
+            f"the part fits at any angle about the axis ({x:.2f}, {y:.2f}, {z:.2f}) (symmetry): every turn is "
+            "correct, the machine has to use this one; the alternatives list quarter turns",
         )
     if len(choice.others):
         return (f"the part fits in {len(choice.others) + 1} poses equally well: the machine has to use this one",)

@@ -22,7 +22,7 @@ class DatumFeature(StrictMapping):
     skin: Items = Option(description="numbers or names of CAD faces, or selectors of skin")
     fit: Literal["robust", "one_sided"] = Option(
         "robust",
-        description="robust: by least squares to what is not worn; one_sided: from outside, as a surface plate lies on "
+        description="robust: least squares to unworn points; one_sided: from outside, like a surface plate on "
         "a face, a ring on a shaft or a plug in a bore",
     )
 
@@ -36,10 +36,10 @@ several such lists by letter, the first of which fixes all that it can."""
 
 NO_DATUM: Datum = Option(
     (),
-    description="faces that fix the pose in the last fit, as an inspector aligns on datums: numbers or names of CAD "
+    description="faces that fix the pose in the last fit: numbers or names of CAD "
     "faces, or selectors of skin (box, half_space, facing, faces, at, kind); what they do not fix is fixed by the "
     "rest, and reported; default: all of the skin. Or a datum system with precedence, {A: [...], B: [...], C: [...]}: "
-    "A fixes what its shape can, B what is left, C the rest (ISO 5459, ASME Y14.5)",
+    "A fixes what its shape can, B and C the rest (ISO 5459, ASME Y14.5)",
 )
 
 

@@ -90,9 +90,7 @@ class Simulate(ReadScan):
     wavelength: kinds.PositiveFloat | None = Field(
         None, description="wavelength of `waviness`, in the job's unit; default: a fifth of the part's diagonal"
     )
-    waviness_shared: bool = Field(
-        False, description="whether `waviness` is the same in all views, as where they were computed together"
-    )
+    waviness_shared: bool = Field(False, description="whether `waviness` is the same in all views")
     depth_step: float = Field(
         0.0,
         ge=0,
@@ -131,9 +129,7 @@ class Simulate(ReadScan):
         "`scanners` outward; below 0: behind the skin",
         allow_inf_nan=False,
     )
-    patches: float = Field(
-        0.0, ge=0, lt=1, description="share of the skin, in patches, without points, as where it has no texture"
-    )
+    patches: float = Field(0.0, ge=0, lt=1, description="share of the skin, in patches, without points (no texture)")
     patch_size: kinds.PositiveFloat | None = Field(
         None,
         description="how far the patches of `patches` and `sheets` reach, about, in the job's unit; default: a tenth "

@@ -86,7 +86,7 @@ def test_a_turn_that_is_left_is_about_the_bore() -> None:
 def test_a_datum_that_fixes_nothing_is_named() -> None:
     pose = scan("cuboid").align({"A": BOTTOM, "B": TOP})
     assert pose.datums[1].takes == ()
-    assert any("datum B (plane) fixes nothing" in note for note in pose.notes)
+    assert any("datum B (plane) has no effect" in note for note in pose.notes)
 
 
 def test_precedence_decides_which_datum_gives_way() -> None:

@@ -131,7 +131,7 @@ def test_a_datum_fixes_what_wear_leaves_free() -> None:
     pose = align(part, scan, tolerance, datum=[BOTTOM])
     assert measure_error(part, pose, tolerance) < 0.1
     assert pose.free == ()
-    assert any("does not fix" in note and "(1.000, 0.000, 0.000)" in note for note in pose.notes)
+    assert any("does not fix" in note and "(1.00, 0.00, 0.00)" in note for note in pose.notes)
 
 
 @pytest.mark.slow

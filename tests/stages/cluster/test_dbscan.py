@@ -122,7 +122,7 @@ def test_gathering_dense_points_keeps_the_clusters(monkeypatch: pytest.MonkeyPat
 def test_eps_below_the_spacing_is_noted() -> None:
     scan, deviation, _ = plate(20_000, [(30, 30, 10)])
     sites = Dbscan(eps="tolerance").run(scan, deviation, TOLERANCE)
-    assert any("shorter" in note for note in sites.notes)
+    assert any("below the gaps" in note for note in sites.notes)
 
 
 @pytest.mark.parametrize(
