@@ -245,4 +245,5 @@ def draw_wall(seed: int) -> Draw:
     said |= {"scanners": given, "pose": "known" if known else "unknown", "normals": normals}
     tolerance = float(f"{max(TOLERANCES * noise, 0.02):.3g}")
     shown = depth > 2 * tolerance and is_shown(part, left, damage, scanners, spacing)
-    return Draw(part, scan, damage, pose, tolerance, depth, shown, ("align=none",) if known else (), said)
+    known_depth = float("nan") if pit == "chip" else depth  # of a chip it depends on the face that it is asked from
+    return Draw(part, scan, damage, pose, tolerance, known_depth, shown, ("align=none",) if known else (), said)
