@@ -185,8 +185,8 @@ def require_above_noise(tolerance: float, scan: Scan, part: Part) -> None:
 def _refuse_tolerance(tolerance: float, noise: float, part: Part, hint: str = "") -> InputError:
     least, unit = AUTO_TOLERANCE * noise, part.unit
     return InputError(
-        f"tolerance: the noise of the scan is {noise:.2g} {unit}, and the tolerance {tolerance:.3g} {unit}: damage "
-        f"cannot be told from noise; give at least {least:.2g} {unit}, or auto, or a scan with less noise{hint}",
+        f"tolerance: {tolerance:.3g} {unit} is below the noise of the scan, {noise:.2g} {unit}; give at least "
+        f"{least:.2g} {unit}, or auto, or a scan with less noise{hint}",
         topic="noise",
     )
 
@@ -211,10 +211,9 @@ def require_real_clusters(sites: Sites, deviation: Deviation, tolerance: float, 
     deeper = sites.count - spurious
     kept = f"; {deeper} deeper place{'s' * (deeper > 1)} may be damage" if deeper else ""
     raise InputError(
-        f"tolerance: the points scatter by {scatter:.2g} {unit} about the skin, and the tolerance is {tolerance:.3g} "
-        f"{unit}: {outside / len(distance):.0%} of them lie farther outside than that, and {spurious} places below the "
-        f"skin are no deeper than the scatter reaches{kept}; give at least {AUTO_TOLERANCE * scatter:.2g} {unit}, or "
-        "auto, or a scan with less noise",
+        f"tolerance: {tolerance:.3g} {unit} is too small for points that scatter by {scatter:.2g} {unit}: "
+        f"{outside / len(distance):.0%} of them lie farther outside, and {spurious} places are no deeper than the "
+        f"scatter{kept}; give at least {AUTO_TOLERANCE * scatter:.2g} {unit}, or auto, or a scan with less noise",
         topic="noise",
     )
 
@@ -235,13 +234,12 @@ def require_intact(distance: Floats, tolerance: float, part: Part) -> None:
     worn = ""
     if float((distance[size <= near[-1]] > tolerance).mean()) < MOST_OUTSIDE:
         worn = (
-            f"; nothing lies outside, so that the part may be worn by about {float(np.median(near)):.2g} {part.unit} "
-            "over most of its skin, or be smaller than its model"
+            f"; nothing lies outside: the part may be worn by about {float(np.median(near)):.2g} {part.unit} all "
+            "over, or smaller than its model"
         )
     raise StageError(
-        f"only {share:.0%} of the scan points near the part are intact, which means within the tolerance of "
-        f"{tolerance:.3g} {part.unit}; at least {MIN_INTACT:.0%} have to be: damage cannot be told from errors of scan "
-        f"or pose{worn}",
+        f"only {share:.0%} of the scan points near the part are within the tolerance of {tolerance:.3g} {part.unit}; "
+        f"{MIN_INTACT:.0%} are needed to tell damage from errors of scan or pose{worn}",
         f"check the pose first; then a larger tolerance: 75 % of these points lie within {better:.2g} {part.unit}",
         topic="noise",
     )
@@ -273,9 +271,8 @@ def require_walls(tolerance: float, part: Part) -> None:
         return
     unit, most = part.unit, float(np.quantile(thickness, ALL_THIN))
     raise InputError(
-        f"tolerance: {tolerance:.3g} {unit} is more than half the thickness of the part nearly everywhere, which is "
-        f"{most:.3g} {unit} at most: no damage can be found; give far less than {most / 2:.2g} {unit}, or auto; is "
-        "`units` right, and is the tolerance in it?",
+        f"tolerance: {tolerance:.3g} {unit} exceeds half the thickness of the part ({most:.3g} {unit} at most): no "
+        f"damage can be found; give far less than {most / 2:.2g} {unit}, or auto; check `units`",
         topic="unit",
     )
 

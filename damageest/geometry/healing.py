@@ -249,7 +249,7 @@ def _describe_open(vertices: Floats, faces: Ints) -> str:
     return (
         f"not watertight: {'; '.join(parts)} ({len(faces)} triangles in {bodies} "
         f"piece{'s' * (bodies != 1)}). Export the part again as a solid, or close the mesh in a mesh editor; "
-        "a scan in place of a part:  part: {use: earlier_scan, path: ...}"
+        "for a scan: part: {use: earlier_scan, path: ...}"
     )
 
 

@@ -49,7 +49,7 @@ def read_triangles(path: Path, suffix: str) -> tuple[Floats, Ints, str | None]:
     if not meshes:
         raise InputError(
             f"{path}: the file has no triangles; a part must be a closed mesh. Are part and scan "
-            "swapped? Of an earlier scan in place of the part:  part: {use: earlier_scan, path: ...}"
+            "swapped? For an earlier scan: part: {use: earlier_scan, path: ...}"
         )
     vertices, faces = trimesh.util.append_faces(*zip(*meshes, strict=True))
     if faces.min() < 0 or faces.max() >= len(vertices):

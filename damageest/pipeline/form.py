@@ -29,6 +29,13 @@ from damageest.stages.scan import ReadScan
 MEASURED = 40_000
 """Points, about, that the scale is measured with before it is corrected."""
 
+REMEDIES = {
+    "deformed": "take adapt: auto, or look at the part",
+    "views disagree": "check their overlap in the report, or register the views again",
+    "wavy": "take a tolerance above the waviness, or a better scan",
+}
+"""What to do about a fit that is not as designed; the words of the others have it."""
+
 
 @step(gives=("views", "pose", "aligned", "noise", "spacing", "tolerance", "warnings"))
 def correct_views(
@@ -122,7 +129,8 @@ def fit_model(
     found = _tell_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:
-        return found, [Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=unit)]
+        remedy = REMEDIES.get(found.fit.model, "")
+        return found, [Reason("model_fit", found.fit.words, amount=found.fit.amount, unit=unit, remedy=remedy)]
     return found, ()
 
 

@@ -61,8 +61,8 @@ def _make_pore(engine: Engine, state: JobState, number: int) -> FoundSite | None
     below = -float(signed_distance(solid.vertices, state.part)[0].max())
     evidence = weigh_evidence(solid, points, state.aligned, state.deviation, state.part, state.tolerance)
     note = (
-        f"a pore inside the metal: its inner surface is closed, and lies {below:.3g} {state.unit} below the skin at "
-        "least; it counts as lost, and is in no deposit and no path"
+        f"a closed pore at least {below:.3g} {state.unit} below the skin; it counts as lost, but is in no deposit or "
+        "path"
     )
     site = FoundSite(clusters=(number,), method=PORE, members=members, evidence=evidence, notes=(note,))
     return site.with_value(FoundSite.damage, solid)

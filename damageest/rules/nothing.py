@@ -34,8 +34,8 @@ class Nothing(Rule):
 
     def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.interval is None:
-            yield Reason(self.code, "no scan points on its inner surface, so no interval", "widens")
+            yield Reason(self.code, "no scan points on its inner surface, so no interval", "widens", remedy=self.remedy)
         elif is_nothing(site.volume, site.interval, site.uncertainty.certain if site.uncertainty else 0.0):
             low, high = site.interval
             text = f"its volume is {low:.3g} to {high:.3g} {scan.unit}³: errors of scan, pose or form may explain it"
-            yield Reason(self.code, text, "widens", low, f"{scan.unit}³")
+            yield Reason(self.code, text, "widens", low, f"{scan.unit}³", remedy=self.remedy)

@@ -67,7 +67,7 @@ def test_form_errors_raise_the_tolerance() -> None:
 def test_few_intact_points_stop_the_run() -> None:
     require_intact(deviate(0.05, 0.6), 0.2, PART)
     require_intact(np.empty(0), 0.2, PART)
-    with pytest.raises(StageError, match="only 16% of the scan points near the part are intact") as caught:
+    with pytest.raises(StageError, match="only 16% of the scan points near the part are within") as caught:
         require_intact(deviate(0.05), 0.01, PART)
     assert "75 % of these points lie within 0.057 mm" in caught.value.remedy
 

@@ -16,7 +16,7 @@ from typer.main import get_command
 from typer.testing import CliRunner
 
 from damageest.cli import app
-from damageest.error_codes import ERROR_CODES, EXIT_STATUSES, STAGE_PAGES, describe_help, format_errors
+from damageest.error_codes import ERROR_CODES, EXIT_STATUSES, STAGE_PAGES, describe_help, find_page, format_errors
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.registry.contracts import STAGES
 from damageest.rules.advice import TOPICS
@@ -50,6 +50,26 @@ def test_a_page_that_errors_name_is_there_with_its_section(link: str) -> None:
     name, _, anchor = link.partition("#")
     assert (ROOT / name).is_file()
     assert not anchor or anchor in list_anchors(ROOT / name)
+
+
+NAMED = re.compile(r"docs/[\w/-]+\.md(?:#[\w-]+)?")
+SOURCES = [*(ROOT / "damageest").rglob("*.py"), *ROOT.glob("plugins/*/damageest_*/**/*.py")]
+
+
+def test_every_page_that_the_code_names_is_there_with_its_section() -> None:
+    named = {link for path in SOURCES for link in NAMED.findall(path.read_text())}
+    named |= {find_page(fail_in(stage)) for stage in STAGES}
+    assert len(named) > len(STAGES)
+    for link in named:
+        name, _, anchor = link.partition("#")
+        assert (ROOT / name).is_file(), link
+        assert not anchor or anchor in list_anchors(ROOT / name), link
+
+
+def fail_in(stage: str) -> StageError:
+    error = StageError("no", "yes")
+    error.stage = stage
+    return error
 
 
 def test_the_page_has_the_tables_of_errors_and_exit_statuses() -> None:

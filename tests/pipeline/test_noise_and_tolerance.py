@@ -53,7 +53,7 @@ def test_noise_below_the_tolerance_that_alone_makes_very_many_places_is_refused(
     part = PARTS["lever"]()
     scan = Simulate(points=40_000, noise=0.2, pose="identity" if pose == "known" else "random", seed=3).run("mm", part)
     align = "none" if pose == "known" else "register"
-    with pytest.raises(InputError, match=r"scatter by 0\.(19|2|21) mm .* places below the skin .* at least 0\.(7|8)"):
+    with pytest.raises(InputError, match=r"scatter by 0\.(19|2|21) mm: .* places are no deeper .* at least 0\.(7|8)"):
         run_until("look_for_sheets", part, scan, registry, tolerance=0.25, align=align)
 
 
@@ -69,7 +69,7 @@ def test_very_many_clusters_are_refused_only_where_noise_makes_them(deeper: int)
     sites = Sites(label, int(label.max()))
     deviation = Deviation(distance, np.zeros(len(distance), np.int64), np.zeros(len(distance), np.uint8))
     refused = pytest.raises(
-        InputError, match=r"scatter by 0\.(19|2|21) mm .* places below the skin .* at least 0\.(7|8)"
+        InputError, match=r"scatter by 0\.(19|2|21) mm: .* places are no deeper .* at least 0\.(7|8)"
     )
     with nullcontext() if deeper else refused:
         require_real_clusters(sites, deviation, tolerance, part)

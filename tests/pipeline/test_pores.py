@@ -36,7 +36,7 @@ def test_a_pore_is_a_site_of_its_own_and_in_no_deposit() -> None:
     assert site.damage.volume == pytest.approx(true, rel=0.1)
     with pytest.raises(ValueError, match="no deposit"):
         site.mesh("deposit")
-    assert any("a pore inside the metal" in str(note) for note in site.warnings)
+    assert any("a closed pore" in str(note) for note in site.warnings)
 
 
 def test_a_volume_that_no_pose_moves_adds_to_one_that_a_pose_moves() -> None:

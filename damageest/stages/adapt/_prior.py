@@ -138,9 +138,8 @@ def describe_prior(start: Start, tolerance: float, unit: str) -> str:
     parts = f"{used.parts} other part{'' if used.parts == 1 else 's'} of the type"
     if not used.is_used:
         return (
-            f"the form of {parts} was not used: this part is deformed in another way (they leave {used.misfit:.3g} "
-            f"{unit} on its seen skin, where up to {used.limit:.3g} {unit} is usual, or it is far from their mean); "
-            "skin that is lost is predicted from its own skin alone"
+            f"the form of {parts} was not used, since this part deforms in another way (they leave {used.misfit:.3g} "
+            f"{unit} on its seen skin, usually up to {used.limit:.3g} {unit}); its own skin alone predicts lost skin"
         )
     words = f"the form was predicted from {parts}, which leave {used.misfit:.3g} {unit} on its seen skin"
     if start.errors is None:

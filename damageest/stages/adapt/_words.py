@@ -24,4 +24,4 @@ def describe(adapted: AdaptedPart, tolerance: float) -> str:
         )
         if adapted.growth < 0:
             words += "; even wear would look the same"
-    return words
+    return f"{words}; check the rest in the report, coloured by distance"

@@ -68,8 +68,8 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
         turn = float(np.degrees(Rotation.from_matrix(D[:3, :3]).magnitude()))
         raise StageError(
             f"in the given pose {given.on:.0%} of the scan lies on the part; moved by {shift:.3g} {part.unit} and "
-            f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the given pose is wrong by that "
-            "much, or the part is bent or twisted, or the scale of the scan is wrong",
+            f"turned by {turn:.2g} degrees, {fitted.on:.0%} would: the pose is wrong, the part bent, or the scan "
+            "scaled",
             "use align: icp, or give the right T_part_scan",
             topic="pose",
         )

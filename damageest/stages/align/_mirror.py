@@ -204,8 +204,8 @@ def _shows_symmetric(test: MirrorTest, best: Fit, mirrored: Fit) -> bool:
 
 def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
     text = (
-        f"{mirrored.agreement:.0%} of the scan near the part would lie on its surface if it were mirrored, "
-        f"{check.agreement:.0%} does now: it may show a mirrored part, but covers only {check.cover:.0%} of the surface"
+        f"{mirrored.agreement:.0%} of the scan near the part lies on its surface when mirrored, "
+        f"{check.agreement:.0%} as it is: a mirrored part? It covers only {check.cover:.0%} of the surface"
     )
     return Reason("mirrored", text, "contradicts", mirrored.agreement, remedy="scan more of the part")
 
@@ -213,14 +213,13 @@ def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
 def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:
     if mirrored.agreement < DOUBTFUL_AGREEMENT:
         return StageError(
-            f"only {check.agreement:.0%} of what the scan shows near the part lies on its surface, and "
-            f"{mirrored.agreement:.0%} of it would if it were mirrored: it shows a mirrored part, another size, a "
-            "bent one, or another part",
+            f"only {check.agreement:.0%} of the scan near the part lies on its surface, mirrored "
+            f"{mirrored.agreement:.0%}: a mirrored, scaled, bent or other part",
             "scan: {scale: auto} if the scale may be wrong; otherwise check which part was scanned",
             topic="form",
         )
     return StageError(
-        f"the scan is a mirror image of the part: {mirrored.agreement:.0%} of what it shows near the part would lie "
-        f"on its surface if it were mirrored, {check.agreement:.0%} does as it is",
+        f"the scan is a mirror image of the part: mirrored, {mirrored.agreement:.0%} of it near the part lies on the "
+        f"surface, as it is {check.agreement:.0%}",
         "check for a left-hand and a right-hand version of the part, and for an axis that an export reversed",
     )

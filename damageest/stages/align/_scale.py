@@ -45,9 +45,8 @@ class OtherScale:
         percent = 100 * (1 / self.scale - 1)
         size = f"{abs(percent):.3g} % {'larger' if percent > 0 else 'smaller'}"
         return (
-            f"the scale is wrong: the scan is {size} than the part; "
-            f"{self.check.agreement:.0%} of what it shows near the part would lie on its surface if it were multiplied "
-            f"by {self.scale:.4g}, {before.agreement:.0%} does as it is"
+            f"the scale is wrong: the scan is {size} than the part; multiplied by {self.scale:.4g}, "
+            f"{self.check.agreement:.0%} of it near the part lies on the surface, as it is {before.agreement:.0%}"
         )
 
     def make_doubt(self, before: PoseCheck) -> Reason:
@@ -59,10 +58,7 @@ class OtherScale:
         return StageError(self.describe(before), REMEDY, topic="form")
 
 
-REMEDY = (
-    "check the unit of scan and part, the scanner's calibration and the revision of the CAD; export the scan again in "
-    "the part's size"
-)
+REMEDY = "check units, the scanner's calibration and the revision of the CAD; export the scan again in the right size"
 
 
 def ask_scale(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> OtherScale | None:

@@ -129,8 +129,8 @@ class Register(Align):
 def _advise(scan: Scan) -> str:
     """What to do where no pose explains the scan."""
     views = 0 if scan.view is None else len(np.unique(scan.view[scan.view >= 0]))
-    apart = f"check that the {views} views of the scan are not misplaced against each other; " if views > 1 else ""
+    apart = f"check that the {views} views fit together; " if views > 1 else ""
     return (
-        f"check that the scan shows this part and that both have the right unit; {apart}crop away a fixture or table; "
-        "where the pose is known, give it to align: icp or align: none"
+        f"check part, scan and units; {apart}crop away fixture or table; where the pose is known, give it to align: "
+        "icp or align: none"
     )

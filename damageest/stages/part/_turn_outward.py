@@ -38,8 +38,8 @@ def turn_outward(points: Floats, normals: Floats, voxel: float) -> Floats:
     inside = ~shell & ~outside
     if inside.sum() < 8:
         raise InputError(
-            f"the specimen's scan encloses no volume at a resolution of {voxel:.3g}: it has openings wider than "
-            f"{3 * voxel:.3g}, or walls thinner than that; scan it from all sides, or set part.cell"
+            f"the specimen's scan encloses no volume: openings wider than {3 * voxel:.3g}, or thinner walls; scan it "
+            "from all sides, or set part.cell"
         )
     # Outward is the side where the outside is nearer than the inside: distances to both near the point.
     to_outside = ndimage.distance_transform_edt(~outside).astype(np.float32)
@@ -54,8 +54,8 @@ def turn_outward(points: Floats, normals: Floats, voxel: float) -> Floats:
     if thin.mean() > 0.1:
         middle = points[np.flatnonzero(thin)[0]]
         raise InputError(
-            f"the specimen's walls are thinner than its scan resolves ({3 * voxel:.3g}), or the scan has openings, at "
-            f"{100 * thin.mean():.1f} % of its points, for example at ({middle[0]:.4g}, {middle[1]:.4g}, "
+            f"walls thinner than the scan resolves ({3 * voxel:.3g}), or openings, at {100 * thin.mean():.1f} % of the "
+            f"points, for example at ({middle[0]:.4g}, {middle[1]:.4g}, "
             f"{middle[2]:.4g}); scan more points there, or set part.cell smaller"
         )
     # The sum over neighbours on the same face decides where the score of a single point is near 0.

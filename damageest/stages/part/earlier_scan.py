@@ -81,9 +81,8 @@ def read_earlier(
         raise InputError(f"{name}: {fault}") from None
     digest = files_sha256(paths)
     note = (
-        f"stands for the part as an earlier scan of {len(scan.points)} points shows it, in that scan's frame: "
-        f"{made.seen_area:.4g} {unit}² of skin, with a noise of {made.noise:.3g}, edges rounded by about "
-        f"{made.cell:.3g}"
+        f"made of an earlier scan of {len(scan.points)} points, in its frame: {made.seen_area:.4g} {unit}² of skin, "
+        f"noise {made.noise:.3g}, edges rounded by about {made.cell:.3g}"
     )
     return Part(
         made.vertices, made.faces, unit, name, digest, tessellation_error=made.error,

@@ -69,9 +69,8 @@ class PartFromScan(ReadPart):
             raise InputError(f"{', '.join(map(str, paths))}: {fault}") from None
         digest = files_sha256(paths)
         note = (
-            f"reconstructed from {len(scan.points)} points of a scan, not from CAD: its surface has an error of up to "
-            f"{error:.3g} (of 95 % of held-out points, their noise of {noise:.3g} included), sharp edges are rounded "
-            f"by about {cell:.3g}, and the scan's frame is the part's"
+            f"reconstructed from {len(scan.points)} scan points, in the scan's frame: error up to {error:.3g} for 95 "
+            f"% of held-out points (noise {noise:.3g} included), edges rounded by about {cell:.3g}"
         )
         return Part(
             vertices, faces, unit, ", ".join(map(str, paths)), digest, tessellation_error=error,

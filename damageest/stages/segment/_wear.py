@@ -86,8 +86,8 @@ def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     notes: tuple[str, ...] = ()
     if threshold > base:
         notes = (
-            f"intact surface deviates by up to {left:.3g} from the part over whole areas (error of the pose, or of the "
-            f"form of the part): wear shallower than {min(threshold, tolerance):.3g} cannot be distinguished from it",
+            f"intact surface deviates by up to {left:.3g} over whole areas (pose or form): wear shallower than "
+            f"{min(threshold, tolerance):.3g} is not found",
         )
     if threshold >= tolerance:
         return Wear(none, threshold, notes)

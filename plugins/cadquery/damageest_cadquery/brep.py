@@ -78,8 +78,7 @@ class Brep(ReadPart):
         if mesh.error * scale > 1.5 * chord:
             notes.append(
                 f"triangles deviate by up to {mesh.error * scale:.3g} {unit} from the CAD surface, more than the chord "
-                f"of {chord:.3g}: OpenCASCADE leaves large triangles on some spline faces at any chord; a smaller "
-                f"part.angle divides them (now {self.angle:g}; 2 takes longer)"
+                f"of {chord:.3g}; set a smaller part.angle (now {self.angle:g}; 2 takes longer)"
             )
         return make_part(
             mesh.vertices * scale,

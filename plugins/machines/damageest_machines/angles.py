@@ -90,8 +90,8 @@ def _turn_back(
         return None
     where = ", ".join(f"{led.number[k]}" for k in ends[:5]) + (", ..." if len(ends) > 5 else "")
     note = (
-        f"{_name(machine.rotary)} are turned back {len(ends)} times, since they would come to their limits: after pass "
-        f"{where} the tool is drawn out along its axis until it is clear of everything, turned there, and led back"
+        f"{_name(machine.rotary)} are turned back {len(ends)} times before their limits: after pass {where} the tool "
+        "leaves along its axis, turns outside, and returns"
     )
     return Rotated(led, rotary, (note,))
 

@@ -37,7 +37,7 @@ def test_the_box_comes_back_closed_with_a_note_of_its_errors(part: Part) -> None
     assert isinstance(part, Part)
     assert iou([part], [box()]) > 0.98
     assert 0.03 < part.tessellation_error < 0.3
-    assert "25000 points" in part.notes[-1]
+    assert "25000 scan points" in part.notes[-1]
     assert "rounded" in part.notes[-1]
 
 
@@ -84,7 +84,7 @@ def test_walls_thinner_than_the_scan_resolves_are_refused(tmp_path: Path) -> Non
     sheet = trimesh.creation.box((40, 30, 0.6))
     scanner = Simulate.model_validate({"points": 8000, "noise": 0.03})
     np.save(tmp_path / "sheet.npy", scanner.run("mm", Part(sheet.vertices, sheet.faces)).points)
-    with pytest.raises(InputError, match="thinner than"):
+    with pytest.raises(InputError, match="thinner walls"):
         PartFromScan(path=tmp_path / "sheet.npy").run("mm")
 
 

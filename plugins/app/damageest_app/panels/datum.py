@@ -30,8 +30,8 @@ class DatumTool(Panel):
 
     def build(self) -> None:
         html.Div(
-            "Click faces of the part that are not worn; they fix the pose, as an inspector aligns on datums. Together, or "
-            "in order: A fixes what it can, B what is left, C the rest (3-2-1). A second click takes a face away.",
+            "Click unworn faces: they fix the pose. Together, or "
+            "in order: A, then B, then C (3-2-1). A second click takes a face away.",
             classes="fine mb-2",
         )
         with v3.VBtnToggle(v_model=("datum_slot",), mandatory=True, divided=True, color="primary", classes="mb-2"):
