@@ -22,11 +22,10 @@ def measure_off(draw: Draw) -> np.ndarray:
 def test_a_wall_is_scanned_where_it_is_left(seed: int) -> None:
     draw = FAMILIES["walls"][1](seed)
     assert draw.damage is not None
-    off = measure_off(draw)
-    assert off.max() < draw.depth + 2 * draw.tolerance  # as deep as the pit, with noise
-    wall = float(draw.said["wall"])
-    assert off.max() > 0.7 * min(draw.depth, wall / 2)  # beyond half of the wall its other side is nearer
-    assert 0.15 <= draw.depth / wall <= 0.95
+    off, depth, wall = measure_off(draw), float(draw.said["depth"]), float(draw.said["wall"])
+    assert off.max() < depth + 2 * draw.tolerance  # as deep as the pit, with noise
+    assert off.max() > 0.7 * min(depth, wall / 2)  # beyond half of the wall its other side is nearer
+    assert 0.15 <= depth / wall <= 0.95
 
 
 def test_a_pit_that_was_scanned_from_behind_was_not_seen() -> None:
