@@ -52,6 +52,7 @@ from damageest.pipeline.sites import (
 )
 from damageest.pipeline.skin_points import note_unused, sample_near_damage, where_taken
 from damageest.pipeline.surplus import find_surplus, relate_surplus
+from damageest.pipeline.tables import question_table
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_budget, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
 from damageest.pipeline.writing import (
@@ -93,6 +94,7 @@ ACQUIRE: Route = (
     ),
     align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, spacing, part, scan, samples
     #     -> pose, refusal
+    question_table,  # calls Align: scan, part, pose, tolerance, aligner, samples -> scan, part, pose, +warnings
     place_scan,  # scan, pose -> aligned, noise, spacing
     note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader

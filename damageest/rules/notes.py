@@ -33,6 +33,7 @@ RUN_CODES: dict[str, RunCode] = {
     "tolerance_small": RunCode("small tolerance: intact skin may look damaged", 0),
     "tolerance_raised": RunCode("tolerance: auto was raised: intact skin deviates by more than the noise", 0),
     "earlier_scan": RunCode("the part is an earlier scan: only common skin is compared", 0),
+    "table_aside": RunCode("a table in both scans was set aside: it did not move with the part", 0),
     "few_points": RunCode("very few scan points", 0),
     "fell_back": RunCode("method auto took surface, since implicit failed", 1),
     "below_noise": RunCode("shallow places treated as errors of the scan", 0),

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Part, Scan
-from damageest.checks.one_motion import is_one_motion
+from damageest.checks.one_motion import are_sound, is_one_motion
 from damageest.geometry.distance import signed_distance
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import SIZE, box
@@ -68,3 +68,12 @@ def test_wear_of_all_faces_is_no_motion() -> None:
     part, points = box(), scan_box()
     normals = part.face_normals[signed_distance(points, part)[1]]
     assert not ask(points - 2 * TOLERANCE * normals)
+
+
+@pytest.mark.parametrize(("off", "sound"), [(0.0, True), (1.5, False)])
+def test_datums_are_sound_where_the_scan_lies_on_them(off: float, sound: bool) -> None:
+    """What all other skin has in common is then its wear."""
+    on = np.arange(1000) < 300
+    distance = np.where(on, -off, -3.0) + 0.1 * np.random.default_rng(0).normal(size=1000)
+    assert are_sound(distance, on, 1.0) == sound
+    assert not are_sound(distance, on & (np.arange(1000) < 20), 1.0)  # too few to hold anything

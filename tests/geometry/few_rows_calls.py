@@ -52,6 +52,7 @@ from damageest.geometry import (
     spreading,
     stacks,
     stiff_modes,
+    tables,
     touching,
     transforms,
     undoing,
@@ -320,6 +321,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "touching.merge_close": lambda r: expect(
         touching.merge_close(r.mesh.vertices, r.mesh.faces, 0.1), (None, 3), (None, 3)
     ),
+    "tables.find_table": lambda r: tables.find_table(r.points, 0.1) and None,
     "transforms.move_points": lambda r: expect(transforms.move_points(r.points, np.eye(4)), (r.count, 3)),
     "transforms.make_motions": lambda r: expect(
         transforms.make_motions(np.hstack([r.points, r.points])), (r.count, 4, 4)
@@ -387,6 +389,7 @@ WITHOUT_ROWS: dict[str, str] = {
     ),
     **dict.fromkeys(
         (
+            "tables.Table",
             "distance.Closest", "families.Errors", "families.Family", "pieces.JoinedPieces", "pieces.Piece",
             "polygons.PolygonTriangles",
             "pseudonormals.keep_signed_mesh", "rays.Crossings", "stiff_modes.StiffMode", "views.View",

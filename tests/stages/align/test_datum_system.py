@@ -11,7 +11,6 @@ from damageest_evaluate.parts import PARTS
 from damageest_evaluate.scores import measure_pose_error
 from pydantic import ValidationError
 
-import damageest
 from damageest.artefacts import Part, Pose
 from damageest.errors import StageError
 from damageest.stages.align.icp import Icp
@@ -174,22 +173,6 @@ def test_a_list_of_datums_is_asked_as_a_system_is() -> None:
     pose = scan_part(CUBOID, np.where(down, 2.5, 0.0)).align(BOTTOM)
     assert [(one.code, one.effect) for one in pose.doubts] == [("datum_decides", "note")]
     assert not scan_part(CUBOID).align(BOTTOM).doubts
-
-
-@pytest.mark.slow
-def test_where_sound_datums_hold_the_pose_a_common_motion_of_the_rest_is_wear() -> None:
-    """Three faces of six are worn by the same depth, as if a view of them were misplaced."""
-    worn = np.abs(CUBOID.face_normals - 1).min(axis=1) < 0.1
-    scene = scan_part(CUBOID, np.where(worn, 3.0, 0.0), points=12_000)
-    job = {
-        "version": 1, "tolerance": scene.tolerance, "adapt": "none", "report": "none",
-        "align": {"use": "register", "datum": {"A": BOTTOM, "B": SIDE, "C": BACK}},
-    }  # fmt: skip
-    result = damageest.run(job, part=CUBOID, scan=scene.scan)
-    size = CUBOID.bounds[1] - CUBOID.bounds[0]
-    true = size.prod() - (size - 3 * scene.tolerance).prod()
-    assert not any(reason.code == "one_motion" for site in result.sites for reason in site.verdict.reasons)
-    assert result.damage_volume == pytest.approx(true, rel=0.03)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.04])
