@@ -102,6 +102,7 @@ class Milling(Allowance):
         from damageest.geometry.touching import separate_sheets
         from damageest.stages.allowance._booleans import join, keep_touching, simplify_exactly
         from damageest.stages.allowance._cut_back import cut_back
+        from damageest.stages.allowance._cut_through import describe_cut_through
         from damageest.stages.allowance._keep_out import build_keep_out
         from damageest.stages.allowance._limits import find_stock_conflict
         from damageest.stages.allowance._overlap import grow_over_rim
@@ -163,6 +164,8 @@ class Milling(Allowance):
             for conflict in narrow[:1]
         ]
         notes += doubts
+        if cavity is not damage:
+            notes += describe_cut_through(damage, cavity, part, tolerance)
         notes += _describe_touching(conflicts, part)
         notes += _describe_stock(thickness, skins)
         return Deposit(
