@@ -13,6 +13,7 @@ from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, NEAR, PoseChe
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._fine import Fit, fit, fit_each
+from damageest.stages.align._normals import measure_inward
 from damageest.stages.align._pairs import propose_poses
 from damageest.stages.align._points import OrientedPoints
 from damageest.stages.align._prepare_part import PreparedPart
@@ -50,6 +51,9 @@ LITTLE = 0.3
 a mirror image that fits another place of the part."""
 
 
+INWARD = 0.9
+"""Share of the scan's normals from which they point into the part."""
+
 NONE = np.zeros((0, 4, 4))
 """No pose."""
 
@@ -59,7 +63,8 @@ class MirrorTest:
     """What poses of a scan and of its mirror image are found and compared with.
 
     ``points`` (N,3): spread evenly over the scan, in random order; ``raw`` (M,3): any unbiased subset of it;
-    ``oriented``: oriented points of it; ``noise``, ``tolerance`` in diagonals; ``trials``: number of candidate poses.
+    ``oriented``: oriented points of it; ``noise``, ``tolerance`` in diagonals; ``trials``: number of candidate poses;
+    ``has_normals``: whether the signs of their normals are those of the scan's own.
     """
 
     part: PreparedPart
@@ -69,6 +74,7 @@ class MirrorTest:
     noise: float
     tolerance: float
     trials: int
+    has_normals: bool = False
 
     def check(self, pose: Fit, band: float) -> PoseCheck:
         """How well a pose explains the scan, with points on the part up to one and the same ``band`` from it."""
@@ -124,7 +130,7 @@ def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random
         return result
     if check.cover < LITTLE and of_mirrored.cover < LITTLE:
         return replace(result, doubts=(_describe_doubt(check, of_mirrored),))
-    raise _build_error(check, of_mirrored)
+    raise _build_error(check, of_mirrored, _tell_which(test, mirrored.pose))
 
 
 def _is_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
@@ -210,7 +216,16 @@ def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
     return Reason("mirrored", text, "contradicts", mirrored.agreement, remedy="scan more of the part")
 
 
-def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:
+def _tell_which(test: MirrorTest, pose: Floats) -> str:
+    """Which file was mirrored, where the scan's own normals tell: a program that mirrors points and leaves the order of
+    each triangle's corners turns them inward. Empty where they do not; ``pose`` (4,4) mirrors."""
+    scan = test.oriented
+    if not test.has_normals or measure_inward(test.part.surface, scan.points, scan.normals, pose, COARSE) < INWARD:
+        return ""
+    return ". Its normals point inward then: the scan was mirrored, not the part"
+
+
+def _build_error(check: PoseCheck, mirrored: PoseCheck, which: str) -> StageError:
     if mirrored.agreement < DOUBTFUL_AGREEMENT:
         return StageError(
             f"only {check.agreement:.0%} of the scan near the part lies on its surface, mirrored "
@@ -220,6 +235,6 @@ def _build_error(check: PoseCheck, mirrored: PoseCheck) -> StageError:
         )
     return StageError(
         f"the scan is a mirror image of the part: mirrored, {mirrored.agreement:.0%} of it near the part lies on the "
-        f"surface, as it is {check.agreement:.0%}",
+        f"surface, as it is {check.agreement:.0%}{which}",
         "check for a left-hand and a right-hand version of the part, and for an axis that an export reversed",
     )

@@ -61,7 +61,7 @@ class SignedNormals:
 def prefer_outward(target: PartSurface, scan: OrientedPoints, poses: Floats, band: float) -> Floats:
     """Those of the poses (K,4,4), which explain the scan equally well, that its normals do not contradict; all where
     the normals agree with none. The order stays."""
-    inward = np.array([_measure_inward(target, scan.points, scan.normals, pose, band) for pose in poses])
+    inward = np.array([measure_inward(target, scan.points, scan.normals, pose, band) for pose in poses])
     return poses[inward < AGAINST] if inward.min() < ALONG else poses
 
 
@@ -70,7 +70,7 @@ def note_inward(target: PartSurface, frame: Frame, scan: Scan, best: Fit) -> tup
     if scan.normals is None:
         return ()
     index = draw_stratified(len(scan.points), ASKED, np.random.default_rng(0))
-    inward = _measure_inward(target, frame.scale_points(scan)[index], scan.normals[index], best.pose, best.band)
+    inward = measure_inward(target, frame.scale_points(scan)[index], scan.normals[index], best.pose, best.band)
     if inward < WRONG:
         return ()
     return (
@@ -79,7 +79,7 @@ def note_inward(target: PartSurface, frame: Frame, scan: Scan, best: Fit) -> tup
     )
 
 
-def _measure_inward(target: PartSurface, points: Floats, normals: Floats, pose: Floats, band: float) -> float:
+def measure_inward(target: PartSurface, points: Floats, normals: Floats, pose: Floats, band: float) -> float:
     """Share of the points (N,3) on the part whose normals (N,3) point into it in ``pose`` (4,4); 0 where none can be
     compared."""
     distance, _, face = target.closest(move_points(points, pose))

@@ -90,7 +90,9 @@ class Register(Align):
         last = LastFit(frame, fine, dense, noise, tolerance / frame.size, part.unit, datum)
         finish, check = last.run(fit(target, fine, choice.pose, COARSE / 2, noise, 30))
         doubts: tuple[Reason, ...] = ()
-        test = MirrorTest(prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials)
+        test = MirrorTest(
+            prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials, scan.normals is not None
+        )
         scaled = ask_scale(test, finish.fit, check, rng)
         if scaled is not None:
             if not check.is_acceptable:

@@ -92,3 +92,16 @@ def test_the_other_hand_of_an_undamaged_part_is_refused_and_its_own_is_not(seed:
     scan = Scan(points @ turn.T + rng.uniform(-50, 50, 3), noise=0.03)
     assert is_refused(part, mirror(scan), 0.15)
     assert not is_refused(part, scan, 0.15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("turned", [True, False])
+def test_normals_that_were_left_behind_tell_that_the_scan_was_mirrored(turned: bool) -> None:
+    """Points mirrored with the corners of each triangle in their old order have normals that point inward."""
+    part = make_hook()
+    points, face = sample_by_area(part, 8000, np.random.default_rng(1))
+    flip = np.array([1.0, 1.0, -1.0])
+    normals = part.face_normals[face] * flip * (-1 if turned else 1)
+    with pytest.raises(StageError, match="mirror image") as refused:
+        Register().run(Scan(points * flip, normals=normals, noise=0.02), part, 0.2)
+    assert ("the scan was mirrored" in str(refused.value)) == turned
