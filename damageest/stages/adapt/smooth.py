@@ -61,9 +61,8 @@ class Smooth(Adapt):
 
     process: Literal["metal", "casting", "sheet", "polymer"] = Option(
         "metal",
-        description="how the part was made, which says what strain beyond that of a bend or a twist its form may have: "
-        "0.3 % for metal, 1 % for a casting, 3 % for sheet, 10 % for a polymer; more is only taken where it explains "
-        "the skin down to the noise",
+        description="how the part was made: limits strain beyond bend and twist to 0.3 % for metal, 1 % for a casting, "
+        "3 % for sheet, 10 % for a polymer, unless more explains the skin down to the noise",
     )
     prior: JobPaths = Option(
         (),

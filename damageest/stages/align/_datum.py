@@ -37,9 +37,9 @@ several such lists by letter, the first of which fixes all that it can."""
 NO_DATUM: Datum = Option(
     (),
     description="faces that fix the pose in the last fit: numbers or names of CAD "
-    "faces, or selectors of skin (box, half_space, facing, faces, at, kind); what they do not fix is fixed by the "
-    "rest, and reported; default: all of the skin. Or a datum system with precedence, {A: [...], B: [...], C: [...]}: "
-    "A fixes what its shape can, B and C the rest (ISO 5459, ASME Y14.5)",
+    "faces, or selectors of skin (box, half_space, facing, faces, at, kind); other skin "
+    "fixes the rest; default: all skin. Or a datum system with precedence: {A: [...], B: [...], C: [...]} "
+    "(ISO 5459, ASME Y14.5)",
 )
 
 

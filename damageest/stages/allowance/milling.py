@@ -64,10 +64,9 @@ class Milling(Allowance):
     )  # fmt: skip
     prepare: Prepare | None = Field(
         None,
-        description="{min_radius, wall_angle, undercut: remove, depth}: the cavity is opened before deposition, so "
-        "that cutter and beam reach all of it: walls lean outward by wall_angle (degrees) at least, undercuts are "
-        "removed, what is narrower than the radius is widened, depth is added below; default: as it is. The damage "
-        "volume stays",
+        description="{min_radius, wall_angle, undercut: remove, depth}: opens the cavity for cutter and beam before "
+        "deposition: walls lean outward by wall_angle (degrees), undercuts go, places narrower than the radius are "
+        "widened, depth is added below; default: not opened. The damage volume stays",
     )
     crowded: Literal["refuse", "clip"] = Field(
         "refuse",

@@ -68,9 +68,8 @@ class Files(Export):
     )
     frame: Literal["part", "scan", "both", "nominal", "all"] = Field(
         "part",
-        description="frame of the files: part (of an adapted part, that of the adapted part), scan (as measured, files "
-        "in scan_frame/), both, nominal (files in nominal_frame/: where the part was adapted, all is moved back to the "
-        "part as designed; else as part), or all three",
+        description="frame of the files: part (adapted, where it was), scan (as measured, in scan_frame/), both, "
+        "nominal (in nominal_frame/: an adapted part moved back to the design), or all three",
     )
     detail: float | None = Field(
         None,

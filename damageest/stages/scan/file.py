@@ -86,8 +86,8 @@ class ScanFile(ReadScan):
     most_points: int = Field(
         4_000_000,
         ge=0,
-        description="of a larger file (PLY, NPY, LAS, LAZ, E57) about so many points are used, chosen evenly, and all "
-        "near damage in addition; 0: all points, whatever memory they need",
+        description="of a larger file (PLY, NPY, LAS, LAZ, E57) about this many points are used, and all near damage; "
+        "0: all points, whatever memory they need",
     )
 
     @model_validator(mode="after")

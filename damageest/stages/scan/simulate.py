@@ -138,8 +138,8 @@ class Simulate(ReadScan):
     misplaced: float = Field(
         0.0,
         ge=0,
-        description="error of registration of the views, in the job's unit: each view of `scanners` after the first is "
-        "moved by a shift of this length and a rotation that moves the part's ends by about as much",
+        description="error of registration of the views, in the job's unit: each view after the first is shifted by "
+        "this length and turned by about as much at the part's ends",
     )
     scale: kinds.PositiveFloat = Field(
         1.0, description="factor on all lengths of the scan, such as 1.002 for a wrong scale bar"

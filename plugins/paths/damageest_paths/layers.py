@@ -86,11 +86,11 @@ class Layers(Path):
     )
     layers: Literal["auto", "planar", "conformal"] = Field(
         "auto",
-        description="planar: planes across the build direction; conformal: surfaces at equal depth above the floor of "
-        "the cavity, that is what of the deposit lies on metal and is less than 75 degrees steep; auto: planar, or "
-        "conformal where planes lose more than 7 % of the deposit as planes, and it half or less of what they lose",
+        description="planar: planes across the build direction; conformal: surfaces at equal height above the floor "
+        "of the cavity, up to 75 degrees steep; auto: conformal where planes lose more than 7 % of the deposit and it "
+        "loses at most half of that, else planar",
     )
-    width: Length = Field(description="of a bead; may be left out with calibration, as height")
+    width: Length = Field(description="of a bead; optional with calibration, like height")
     feed: Length = Field(description="speed of deposition, in lengths a minute")
     nozzle: Nozzle = Field(
         description="{tip_radius, cone_angle, length, body_radius}: a flat tip, a cone of this angle (degrees) between "
