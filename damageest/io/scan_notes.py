@@ -131,7 +131,7 @@ def describe_coarse(points: Floats, path: Path) -> Reason | None:
         return None
     text = (
         f"{path.name}: single precision so far from the origin ({far.max():.4g}) gives steps of {step:.2g}, "
-        f"{size / step:.0f} across the scan"
+        f"{size / step:.0f} steps across the scan"
     )
     return Reason("coarse_numbers", text, amount=step, remedy="move the scan near the origin, then export it")
 

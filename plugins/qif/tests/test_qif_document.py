@@ -100,7 +100,7 @@ def test_datums_are_features_in_their_order(tmp_path: Path, result: Result) -> N
         for one in frame.findall(f"{Q}Datums/{Q}Datum")
     ]
     assert used == [("A", "PRIMARY"), ("B", "SECONDARY")]
-    assert "shift along (1.000" in read_attributes(frame)["left_free"]
+    assert "shift along (1.00" in read_attributes(frame)["left_free"]
     normals = [one.findtext(f"{Q}Normal") for one in root.iter(f"{Q}PlaneFeatureNominal")]
     assert normals == ["0 0 -1", "0 -1 0"]
 
