@@ -114,7 +114,8 @@ POSE[:3, 3] = (130, -50, 290)
 def test_a_reader_that_merges_vertices_finds_it_closed(seed: int, tmp_path: Path) -> None:
     """Written as the stage `export` writes it, in the part's frame and in that of a scan."""
     deposit = make_case(seed)[3]
-    result = SimpleNamespace(pose=Pose(POSE))
+    pose = Pose(POSE)
+    result = SimpleNamespace(pose=pose, transform_to_scan=invert_pose(pose))
     written = _keep_closed(deposit, result)
     for T in (None, invert_pose(result.pose)):
         body = Body("deposit", move_mesh(written, T), (1, 2, 3))
