@@ -43,8 +43,12 @@ EXCEPTIONS = {
     "damageest_evaluate": {
         "damageest.checks.model_fit",
         "damageest.checks.scan_quality",
+        "damageest.inspection.aim",
+        "damageest.inspection.compare",
+        "damageest.job.sections",
         "damageest.job.yamlfile",
         "damageest.rules.notes",
+        "damageest.sections.measure",
         "damageest.stages.align.register",
         "damageest.stages.scan.deformation",
         "damageest.stages.scan.scanner",
@@ -54,10 +58,9 @@ EXCEPTIONS = {
     "damageest_machines": {"damageest.job.yamlfile"},
 }
 """Modules that one plugin uses although they are not public: the evaluation makes its scans with the virtual scanner,
-measures single steps of a run, and counts the notes that it prints; exact stock is compared with the stage's on the
-exact damage volume's own skin; the app edits the text of job files, and shows
-what a run wrote; machine files are read as job files are. The list in pyproject.toml is the same for what is
-forbidden there."""
+measures single steps of a run, inspections and sections, and counts the notes that it prints; exact stock is compared
+with the stage's on the exact damage volume's own skin; the app edits the text of job files, and shows what a run wrote;
+machine files are read as job files are. The list in pyproject.toml is the same for what is forbidden there."""
 
 
 def is_public(module: str, name: str) -> bool:
