@@ -85,10 +85,12 @@ def check_fit(points: Floats, mesh: Mesh) -> None:
     assert distance.max() < 2 * TOLERANCE
 
 
+@pytest.mark.slow
 def test_without_a_correction_the_transform_is_all(tmp_path: Path) -> None:
     assert "rescaled" not in run(tmp_path, place(sample_damaged()))["alignment"]
 
 
+@pytest.mark.slow
 def test_temperature(tmp_path: Path) -> None:
     content = run(tmp_path, place(FACTOR * sample_damaged()), temperature=HOT)
     assert content["alignment"]["rescaled"]["factor"] == pytest.approx(FACTOR, abs=1e-12)
