@@ -11,6 +11,7 @@ from tests.pipeline.halfway import run_until
 from tests.sparse_scenes import as_part, block, pocket, scan
 
 
+@pytest.mark.slow
 def test_a_speck_has_a_place_in_the_parts_frame(registry: Registry) -> None:
     points = scan(block() - pocket(2.0))
     stray = np.array([-10.0, -5.0, 2.6]) + np.random.default_rng(0).uniform(-0.15, 0.15, (9, 3))
