@@ -20,7 +20,7 @@ from damageest.pipeline.engine import Engine, Route, follow, start
 from damageest.pipeline.notebook import find_notebook
 from damageest.pipeline.routes import WRITE, route_of
 from damageest.pipeline.state import JobState
-from damageest.pipeline.watch import MemoryCache, Progress, Signal, Teller, cancel_with, keep_so_far
+from damageest.pipeline.watch import MemoryCache, Progress, Signal, Teller, call_with_cancel, keep_so_far
 from damageest.pipeline.workspace import open_workspace
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
@@ -65,8 +65,9 @@ def run(
     route = route_of(job.method) if output is False else (*route_of(job.method), *WRITE)
     told = find_notebook() if progress is None else progress
     teller = None if told is None else Teller(told, route)
-    with _observed(registry, teller), cancel_with(cancel):
-        result = _run(job, route, registry, limits, output, cache)
+    found = job
+    with _observed(registry, teller):
+        result = call_with_cancel(cancel, lambda: _run(found, route, registry, limits, output, cache))
     if teller is not None:
         teller.finish()
     return result

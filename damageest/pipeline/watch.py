@@ -9,7 +9,7 @@ from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from damageest.errors import CancelledError, DamageestError
 from damageest.pipeline.engine import Branch, Engine, Route
@@ -17,6 +17,8 @@ from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import Step
 from damageest.registry.hookspecs import hookimpl
 from damageest.result import SoFar
+
+T = TypeVar("T")
 
 POLL = 0.02
 """Seconds between two looks at whether the caller has cancelled."""
@@ -144,20 +146,21 @@ class _Watcher:
         self._thread.join()
 
 
-@contextmanager
-def cancel_with(signal: Signal | None) -> Iterator[None]:
-    """Ends what runs in the ``with`` block, in this thread, soon after ``signal`` is set: as Ctrl-C would, so that its
-    processes end and its scratch files go. Raises CancelledError then."""
+def call_with_cancel(signal: Signal | None, call: Callable[[], T]) -> T:
+    """What ``call`` gives. It ends soon after ``signal`` is set, as by Ctrl-C, so that its processes end and its
+    scratch files go. Raises CancelledError then.
+
+    It is no context manager: an interrupt between the block and the end of the watch would come out of it.
+    """
     if signal is None:
-        yield
-        return
+        return call()
     if signal.is_set():
         raise CancelledError
     watcher = _Watcher(signal)
     try:
         try:
             watcher.start()
-            yield
+            return call()
         finally:
             watcher.end()
     except KeyboardInterrupt as error:

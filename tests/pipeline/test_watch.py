@@ -11,7 +11,7 @@ import time
 import pytest
 
 from damageest.errors import CancelledError
-from damageest.pipeline.watch import cancel_with
+from damageest.pipeline.watch import call_with_cancel
 
 
 def work(seconds: float) -> None:
@@ -24,8 +24,8 @@ def test_what_runs_ends_soon_after_the_signal() -> None:
     cancel = threading.Event()
     threading.Timer(0.05, cancel.set).start()
     began = time.perf_counter()
-    with pytest.raises(CancelledError), cancel_with(cancel):
-        work(10)
+    with pytest.raises(CancelledError):
+        call_with_cancel(cancel, lambda: work(10))
     assert time.perf_counter() - began < 5
 
 
@@ -36,8 +36,7 @@ def test_a_signal_at_the_very_end_leaves_no_interrupt_behind() -> None:
         timer = threading.Timer(0.005 * (k % 8), cancel.set)
         timer.start()
         try:
-            with cancel_with(cancel):
-                work(0.02)
+            call_with_cancel(cancel, lambda: work(0.02))
         except CancelledError:
             assert cancel.is_set()
         timer.join()
@@ -46,8 +45,11 @@ def test_a_signal_at_the_very_end_leaves_no_interrupt_behind() -> None:
 
 
 def test_ctrl_c_stays_ctrl_c() -> None:
-    with pytest.raises(KeyboardInterrupt) as caught, cancel_with(threading.Event()):
+    def press() -> None:
         raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt) as caught:
+        call_with_cancel(threading.Event(), press)
     assert not isinstance(caught.value, CancelledError)
 
 
@@ -56,18 +58,19 @@ def test_a_program_that_is_traced_goes_on() -> None:
     script = textwrap.dedent("""
         import sys, threading, time
         from damageest.errors import CancelledError
-        from damageest.pipeline.watch import cancel_with
+        from damageest.pipeline.watch import call_with_cancel
         sys.settrace(lambda frame, event, told: None)
         def add(a, b):
             return a + b
+        def work(is_endless):
+            time.sleep(0.01)
+            while is_endless:
+                add(1, 2)
         for is_set in (False, True):
             cancel = threading.Event()
             threading.Timer(0.02, cancel.set).start() if is_set else None
             try:
-                with cancel_with(cancel):
-                    time.sleep(0.01)
-                    while is_set:
-                        add(1, 2)
+                call_with_cancel(cancel, lambda: work(is_set))
             except CancelledError:
                 print("cancelled")
             print(add(1, 2))
