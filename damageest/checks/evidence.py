@@ -165,9 +165,10 @@ def _share_unseen(part: Part, damage: Solid, inner: Flags, points: Floats, on_sk
     near = np.ones(len(part.faces), bool)
     for along, least, most in zip(part.vertices.T, low, high, strict=True):
         near &= (along < most)[part.faces].any(axis=1) & (along > least)[part.faces].any(axis=1)
-    count = int(np.clip(np.linalg.norm(part.cross[near], axis=1).sum() / 2 / (0.7 * reach) ** 2, 1000, 2 * MOST))
-    if not (np.linalg.norm(part.cross[near], axis=1).sum() > 0):
+    area = float(np.linalg.norm(part.cross[near], axis=1).sum() / 2)
+    if not area > 0:
         return 0.0
+    count = int(np.clip(area / (0.7 * reach) ** 2, 1000, 2 * MOST))
     skin, face = sample_by_area(part, count, np.random.default_rng(0), np.flatnonzero(near))
     close = _measure_gap(skin, on_skin, 6 * reach) < 6 * reach
     skin, face = skin[close], face[close]
