@@ -43,7 +43,7 @@ def test_a_run_needs_no_extra_and_names_the_one_of_the_page(tmp_path: Path) -> N
     assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.15)
     said = [str(warning) for warning in result.warnings if warning.code == "report"]
     assert said == [
-        "report.html was not written: the Python module k3d is not installed; the extra 'report' brings it; "
+        "report.html was not written: the Python module k3d is not installed; the extra 'report' brings it. "
         + describe_install("report")
     ]
     written = json.loads((tmp_path / "out" / "result.json").read_text())

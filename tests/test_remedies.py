@@ -110,4 +110,6 @@ def test_an_interval_is_told_with_two_digits_of_half_its_width(interval: tuple[f
 def test_a_reason_has_no_exponents_and_its_remedy_is_a_sentence() -> None:
     assert str(Reason("beside", "up to 4.601e+04 mm³ lost", remedy="scan again")) == "up to 46010 mm³ lost. Scan again"
     assert str(Reason("align", "it is free", remedy="align: none")) == "it is free. align: none"
+    for command in ('pip install "damageest[report]"', "uv sync --all-extras", "damageest doctor"):
+        assert str(Reason("report", "no page", remedy=command)) == f"no page. {command}"
     assert str(Reason("align", "a/1e+05/1.2e+05.ply stays")) == "a/1e+05/1.2e+05.ply stays"

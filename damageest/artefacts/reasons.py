@@ -13,6 +13,9 @@ Effect = Literal["contradicts", "open", "widens", "note"]
 """What a reason does to a verdict. `contradicts`: the site is doubtful. `open`: something could not be seen; without an
 amount, the upper end of the interval is open. `widens`: it is a term of the interval. `note`: it changes no verdict."""
 
+# A line of a job, and a command of a terminal: both are written as they are.
+_LITERAL = re.compile(r"\w+:|(pip|uv|damageest|python) ")
+
 
 @dataclass(frozen=True)
 class Reason:
@@ -40,5 +43,5 @@ class Reason:
         """The text, and the remedy as a sentence of its own."""
         if not self.remedy:
             return self.text
-        is_key = re.match(r"\w+:", self.remedy)  # a line of a job is written as it is
-        return f"{self.text}. {self.remedy if is_key else self.remedy[0].upper() + self.remedy[1:]}"
+        is_literal = _LITERAL.match(self.remedy)
+        return f"{self.text}. {self.remedy if is_literal else self.remedy[0].upper() + self.remedy[1:]}"
