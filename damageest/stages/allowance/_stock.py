@@ -29,6 +29,8 @@ ROUNDS = 3
 INSET = 4e-3
 """How far inside its border the stock begins, in slacks. Stock that ended exactly where other metal begins would touch
 it along lines without thickness."""
+LIFT = 2e-3
+"""How much higher than asked the stock is, in slacks: rounding errors leave it nowhere lower."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +49,8 @@ class _Edges:
 
 
 def build_stock(skin: SkinFaces, slack: float, has_room: bool = True, inset: float = INSET) -> Any:
-    """A Manifold relative to the skin's origin: stock of the height of each face, or up to ``slack`` more.
+    """A Manifold relative to the skin's origin: stock of the height of each face; over skin that bends
+    between its triangles, up to half of ``slack`` more.
 
     It reaches a little below the skin; the caller cuts that off. ``has_room``: whether no stock meets that of opposite
     skin. ``inset``: how far inside the skin's border the stock begins, in slacks.
@@ -58,7 +61,7 @@ def build_stock(skin: SkinFaces, slack: float, has_room: bool = True, inset: flo
     if not len(skin.faces):
         return Manifold()
     edges = _find_edges(skin)
-    height = skin.height + slack / 2
+    height = skin.height + LIFT * slack
     group, up = _find_directions(skin, height, edges, slack / 2)
     sink = 1e-3 * slack
     corner = skin.triangles

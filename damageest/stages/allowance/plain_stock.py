@@ -15,8 +15,8 @@ def build_plain_stock(skin: Mesh, height: Floats, origin: Floats, tolerance: flo
     """Stock as `allowance: milling` builds it, without targets, regions to keep free or overlap: a Manifold about
     ``origin`` (3,) with stock of ``height`` (F,) on each triangle of ``skin``, whose neighbours share vertices.
 
-    As with that stage, it is up to a quarter of ``tolerance`` higher, reaches a little below the skin, and may lie in
-    metal that stands over the skin.
+    As with that stage, it is on curved skin up to a quarter of ``tolerance`` higher, reaches a little below the skin,
+    and may lie in metal that stands over the skin.
     """
     count = len(skin.faces)
     own = SkinFaces(

@@ -16,7 +16,7 @@ from damageest.geometry.vectors import normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
 from damageest_cadquery._cut import find_rim
 from damageest_cadquery._join_stock import Lump
-from damageest_cadquery._own_skin import build_own_stock, build_plain, is_plain
+from damageest_cadquery._own_skin import build_own_stock, is_plain
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, explore_faces
 from damageest_cadquery._split import Piece, triangulate
@@ -50,9 +50,8 @@ def compare_stock(
     part: Part,
     tolerance: float,
 ) -> tuple[float, float, float]:
-    """Distance, largest distance and difference of volumes between stock, as high as the mesh's, on an exact
-    ``damage`` volume, and the mesh's. Its parts, ``lumps``, are joined as triangles, which takes a second where
-    OpenCASCADE takes a minute.
+    """Distance, largest distance and difference of volumes between stock on an exact ``damage`` volume, and the mesh's.
+    Its parts, ``lumps``, are joined as triangles, which takes a second where OpenCASCADE takes a minute.
 
     Raises StockError where it differs too much, also from what the stage builds on the exact damage volume's own skin.
     """
@@ -91,18 +90,6 @@ def _leave_touching(lost: Solid, outside: Ints, part: Part, tolerance: float) ->
     the CAD face nearest to them may be that of the other solid."""
     above = lost.triangles[outside].mean(axis=1) + tolerance / 8 * lost.face_normals[outside]
     return outside[~is_inside(above, part)]
-
-
-def lower_stock(deposit: Deposit, lost: Solid, part: Part, tolerance: float) -> Deposit | None:
-    """The mesh's deposit with stock that is a quarter of the tolerance lower: of the height that the job asks for. None
-    where something took stock away, so that it cannot be built anew."""
-    skin = _leave_touching(lost, np.flatnonzero(~find_inner_faces(lost, part)), part, tolerance)
-    if not is_plain(deposit, lost, skin, part, tolerance, VOLUME * deposit.volume):
-        return None
-    origin = deposit.bounds.mean(axis=0)
-    stock = build_plain(deposit, lost, skin, part, tolerance, tolerance / 4)
-    vertices, triangles = to_arrays(stock + to_manifold(lost, origin))
-    return Deposit(vertices + origin, triangles, heights=deposit.heights, stock_volume=stock.volume())
 
 
 def _compare_surfaces(

@@ -1,14 +1,10 @@
-"""Finds the exact deposit of a site: its exact damage volume, with stock that is the offset of its CAD faces.
-
-The mesh's stock is a quarter of the tolerance higher than the job asks for, so that facets are nowhere lower. So stock
-of that height is built too, and compared with the mesh; what is written has the height that the job asks for.
-"""
+"""Finds the exact deposit of a site: its exact damage volume, with stock that is the offset of its CAD faces."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from damageest.artefacts import Deposit, Part, Solid
@@ -16,7 +12,7 @@ from damageest.errors import InputError
 from damageest.geometry.bodies import split_bodies
 from damageest.geometry.solids import to_manifold
 from damageest_cadquery._check import INVALID, ON_CAD
-from damageest_cadquery._compare_stock import bound_entered, compare_stock, lower_stock
+from damageest_cadquery._compare_stock import bound_entered, compare_stock
 from damageest_cadquery._read import explore
 from damageest_cadquery._solids import StockError, combine, explore_faces, naming, settle_edges, sew, turn_offsets
 from damageest_cadquery._split import (
@@ -46,8 +42,6 @@ SPECK = 1e-3
 class ExactDeposit:
     """``volume``; ``distance``: 95 % of the stock's surface, but for that near the damage's outline, are as near to
     the mesh's, both ways; ``farthest``: all; ``difference``: of the stock's volumes, as a share of the mesh deposit.
-
-    The latter three are those of stock as high as the mesh's.
     """
 
     pieces: tuple[Piece, ...]
@@ -82,7 +76,8 @@ def find_deposit(
     with naming(numbers):
         try:
             bases = [base for piece in damage for base in take_bases(piece, dict(deposit.heights))]
-            figures = _compare(damage, bases, deposit, lost, part, tolerance)
+            parts = build_parts(bases) if bases else []
+            figures = compare_stock(damage, bases, parts, deposit, lost, part, tolerance)
             stock = _build(bases, damage, rest, part, tolerance, deposit)
             pieces = _join(damage, stock, bases, faces, part, tolerance) if stock else tuple(damage)
             whole = sum(triangulate(piece.shape, tolerance / 16).volume for piece in pieces)
@@ -107,22 +102,6 @@ def find_deposit(
         if not all(settle_edges(piece.shape) for piece in pieces) or not is_sound(pieces):
             raise StockError(INVALID, _find_invalid(pieces))
         return ExactDeposit(pieces, volume, *figures, time.process_time() - start)
-
-
-def _compare(
-    damage: Sequence[Piece], bases: Sequence[Base], deposit: Deposit, lost: Solid, part: Part, tolerance: float
-) -> tuple[float, float, float]:
-    """What `compare_stock` gives for stock as high as the mesh's. Where that cannot be built, as where only the quarter
-    of a tolerance more makes it fold in a fillet, the mesh's is lowered by it."""
-    higher = [replace(base, height=base.height + tolerance / 4) for base in bases]
-    try:
-        parts = build_parts(higher) if bases else []
-    except StockError:
-        parts, lower = build_parts(bases), lower_stock(deposit, lost, part, tolerance)
-        if lower is None:
-            raise
-        return compare_stock(damage, bases, parts, lower, lost, part, tolerance)
-    return compare_stock(damage, higher, parts, deposit, lost, part, tolerance)
 
 
 def refuse_doubles(deposit: Solid | None, damage: Sequence[Piece], doubles: Sequence[Piece]) -> None:

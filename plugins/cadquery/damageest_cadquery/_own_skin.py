@@ -44,19 +44,12 @@ def build_own_stock(damage: Sequence[Piece], deposit: Deposit, metal: Any, toler
 def is_plain(deposit: Deposit, lost: Solid, outside: Ints, part: Part, tolerance: float, most: float) -> bool:
     """Whether the mesh's stock is that of its heights by CAD face and nothing took any of it away, as a region to keep
     free or an opposite wall does, within a volume of ``most``. ``outside``: the faces of ``lost`` on the skin."""
-    stock = build_plain(deposit, lost, outside, part, tolerance, 0.0)
-    return abs(float(stock.volume()) - deposit.stock_volume) <= most
-
-
-def build_plain(deposit: Deposit, lost: Solid, outside: Ints, part: Part, tolerance: float, less: float) -> Any:
-    """A Manifold about the middle of ``deposit``: stock of its heights by CAD face, each ``less`` by this, on the skin
-    of ``lost``, and nothing taken away but the part."""
     assert part.faces_brep is not None
     skin = Mesh(lost.vertices, lost.faces[outside])
     numbers = part.faces_brep[closest_on_mesh(skin.triangles.mean(axis=1), part)[1]]
-    heights = {number: height - less if height > 0 else height for number, height in deposit.heights}
-    stock = _build(skin, heights, numbers, deposit, tolerance)
-    return stock - to_manifold(part, deposit.bounds.mean(axis=0))
+    stock = _build(skin, dict(deposit.heights), numbers, deposit, tolerance)
+    stock = stock - to_manifold(part, deposit.bounds.mean(axis=0))
+    return abs(float(stock.volume()) - deposit.stock_volume) <= most
 
 
 def _build(skin: Mesh, heights: Mapping[int, float], numbers: Ints, deposit: Deposit, tolerance: float) -> Any:

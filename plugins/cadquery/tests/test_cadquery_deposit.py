@@ -178,7 +178,7 @@ def test_deposits_are_written_with_offset_faces(done: Run) -> None:
         assert measure_volume(solid.wrapped) == pytest.approx(exact["volume"], rel=1e-6)
         assert solid.BoundingBox().zmax == pytest.approx(6 + HIGH, abs=1e-6)
         assert site.deposit is not None
-        assert exact["volume"] < site.deposit.volume, "the mesh is a quarter of the tolerance higher"
+        assert site.deposit.volume == pytest.approx(exact["volume"], rel=0.005), "both are as high as the job asks"
         assert exact["distance"] <= done.result.tolerance / 4
         assert len(solid.Faces()) == exact["faces"] < 20
     stock = done.said[0]["exact"]["deposit"]["volume"] - done.said[0]["exact"]["volume"]
@@ -291,33 +291,3 @@ def test_a_small_body_of_the_damage_may_carry_stock(done: Run) -> None:
     assert min(volumes) > least
     with pytest.raises(StockError, match="2 solids for 1 pieces"):
         find(0.45)
-
-
-@pytest.mark.slow
-def test_where_only_the_height_of_the_mesh_folds_the_mesh_is_lowered(
-    done: Run, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """As in a fillet whose radius lies between both heights."""
-    from damageest_cadquery import _deposit
-
-    site = done.result.sites[0]
-    deposit = site.deposit
-    assert isinstance(deposit, Deposit)
-    ((top, high),) = deposit.heights
-    pieces = (take_pit(BALL["radius"], top),)
-    tried: list[float] = []
-
-    def fold(bases: list[Base]) -> Any:
-        tried.append(bases[0].height)
-        if bases[0].height > high + 1e-9:
-            raise StockError("the offset of a face folds")
-        return build_parts(bases)
-
-    monkeypatch.setattr(_deposit, "build_parts", fold)
-    bases = [base for piece in pieces for base in take_bases(piece, dict(deposit.heights))]
-    _, _, difference = _deposit._compare(pieces, bases, deposit, site.damage, done.result.part, 0.2)
-    assert tried == [high + 0.05, high]
-    assert abs(difference) < 0.02
-    less = replace(deposit, stock_volume=0.9 * deposit.stock_volume)
-    with pytest.raises(StockError, match="folds"):  # what took stock away is not known
-        _deposit._compare(pieces, bases, less, site.damage, done.result.part, 0.2)

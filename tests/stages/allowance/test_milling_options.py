@@ -14,6 +14,7 @@ from damageest.artefacts import Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_manifold
 from damageest.io.meshes import write_stl
+from damageest.stages.allowance._stock import LIFT
 from damageest.stages.allowance.milling import Milling
 from tests.stages.allowance.shapes import (
     INSET,
@@ -27,10 +28,20 @@ from tests.stages.allowance.shapes import (
     solid_of,
 )
 
-MORE = TOLERANCE / 4
+MORE = LIFT * TOLERANCE / 2
 """How much higher the stock is than asked for, so that it is nowhere lower."""
 CHIP = Manifold.cube((6, 5, 4)).translate((0, 0, 8))
 """At a corner of the block: 6 along x, 5 along y, 4 down from the top."""
+
+
+def test_stock_on_a_round_has_the_volume_of_its_offset() -> None:
+    """As the STEP file has it: the mesh's stock was a quarter of the tolerance higher, 3 % of this one."""
+    radius, high, depth, length = 12.0, 0.8, 3.0, 20.0
+    bar = Manifold.cylinder(40, radius, radius, 180)
+    segment = bar ^ Manifold.cube((10, 40, length)).translate((radius - depth, -20, 10))
+    deposit = deposit_on(bar, segment, outer=high)
+    half = np.arccos(1 - depth / radius)
+    assert deposit.stock_volume == pytest.approx(half * ((radius + high) ** 2 - radius**2) * length, rel=1e-3)
 
 
 def extent(deposit: Solid) -> list[float]:

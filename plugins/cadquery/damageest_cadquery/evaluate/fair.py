@@ -59,8 +59,7 @@ class Cad:
 
         outer = np.array([" inner " not in name for name in damage.face_names])[damage.faces_brep]
         skin = Mesh(damage.vertices, damage.faces[outer])
-        # the stage's stock is a quarter of the tolerance higher
-        heights = np.full(len(skin.faces), height - self.tolerance / 4)
+        heights = np.full(len(skin.faces), height)
         stock = build_plain_stock(skin, heights, self.origin, self.tolerance)
         hole = to_manifold(damage, self.origin)
         rest = (stock ^ (self.fine - hole)).decompose()

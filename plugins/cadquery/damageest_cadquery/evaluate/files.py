@@ -196,8 +196,8 @@ def _measure_run(
             row["damage"] = {"mesh": site.damage.volume}
             row["skin"] = _measure_skin(site.damage, result.part)
         made = exact.get("deposit")
-        if made and not made["reason"]:
-            row["deposit"] = {"mesh": _measure_deposit(site, result, tolerance, allowance)}
+        if made and not made["reason"] and site.deposit is not None:
+            row["deposit"] = {"mesh": site.deposit.volume}
         elif not made:
             row["no_deposit"] = " ".join("; ".join(result.failures).split())[:300] or "the run gave none"
         opened = site.deposit if isinstance(site.deposit, Deposit) else None
@@ -210,20 +210,6 @@ def _measure_run(
     if not sites:
         return {"error": "the run found no damage", "kind": "no site"}
     return {"coloured": coloured, "sites": sites, "warnings": [str(each)[:200] for each in said.get("warnings", [])]}
-
-
-def _measure_deposit(site: Any, result: Any, tolerance: float, allowance: dict[str, Any]) -> float:
-    """The volume of the mesh with stock as high as that of the exact form; the run's is a quarter tolerance higher."""
-    from damageest.errors import StageError
-    from damageest.registry import Registry
-
-    milling: Any = Registry.discover().get("allowance", "milling").cls
-    stage = milling(**{**allowance, "outer": (STOCK - 0.25) * tolerance})
-    try:
-        deposit = stage.run(site.damage, result.part, tolerance, None)
-    except StageError:
-        return float("nan")
-    return float("nan") if deposit is None else float(deposit.volume)
 
 
 def _measure_skin(damage: Any, part: Any) -> float:
