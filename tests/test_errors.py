@@ -6,19 +6,15 @@ import errno
 import time
 import unicodedata
 
-import pytest
-
 from damageest.errors import MOST_TEXT, clean_message, describe_missing_library, describe_shortage
 
 
-@pytest.mark.parametrize("code", [*range(0x20), *range(0x7F, 0xA0), 0x200F, 0x2028, 0x202E, 0x2067, 0xD800, 0xDFFF])
-def test_what_a_terminal_obeys_is_written_out(code: int) -> None:
-    text = clean_message(f"a{chr(code)}b")
-    assert text.startswith("a")
-    assert text.endswith("b")
-    assert text in ("a b", "a\nb") or text == f"a{ascii(chr(code))[1:-1]}b"
-    assert not any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in text.replace("\n", ""))
-    text.encode()
+def test_what_a_terminal_obeys_is_written_out() -> None:
+    for code in (*range(0x20), *range(0x7F, 0xA0), 0x200F, 0x2028, 0x202E, 0x2067, 0xD800, 0xDFFF):
+        text = clean_message(f"a{chr(code)}b")
+        assert text in ("a b", "a\nb", f"a{ascii(chr(code))[1:-1]}b"), hex(code)
+        assert not any(unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp") for letter in text.replace("\n", ""))
+        text.encode()
 
 
 def test_what_people_write_stays() -> None:

@@ -47,6 +47,7 @@ WRONG: dict[str, Callable[[Manifold, Manifold], Manifold]] = {
 }
 
 
+@pytest.mark.variants(15)
 @pytest.mark.parametrize("name", ["pit", "edge", "deep hole", "worn through", "beside the bore"])
 @pytest.mark.parametrize("kind", WRONG)
 def test_a_wrong_damage_is_refuted_with_a_reason(name: str, kind: str) -> None:

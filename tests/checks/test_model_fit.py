@@ -53,6 +53,7 @@ def test_the_form_predicts_where_intact_skin_lies() -> None:
     assert np.abs(found.predict(points, normals) - true).max() < 0.3 * TOLERANCE
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", ["one face", "two faces", "all over"])
 def test_wear_is_no_form(name: str) -> None:
     points, normals = draw_skin()

@@ -51,6 +51,7 @@ def test_what_broke_off_is_a_proven_site(name: str, points: int) -> None:
     assert site.volume_95[0] <= truth.volume <= site.volume_95[1]
 
 
+@pytest.mark.slow
 def test_a_whole_body_that_is_gone_is_a_proven_site() -> None:
     second = Manifold.cube((10, 40, 10), True).translate((45, 0, -5))
     result = run(BASE + second, BASE, views=[*VIEWS, [200, 10, 20]])

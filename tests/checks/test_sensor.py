@@ -53,6 +53,7 @@ def test_errors_of_a_clean_scan_are_its_noise() -> None:
     assert {one.of for one in sensor.levels} == {"incidence", "distance"}
 
 
+@pytest.mark.slow
 def test_errors_that_regions_share_are_told_from_noise(intact: Result) -> None:
     sensor = intact.sensor
     assert sensor is not None

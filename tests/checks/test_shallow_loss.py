@@ -28,6 +28,7 @@ def scan_box(deep: float) -> np.ndarray:
     return found
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(("deep", "tolerance"), [(0.0, 0.2), (0.15, 0.2), (0.8, 1.0)])
 def test_the_high_end_holds_what_the_tolerance_hides(deep: float, tolerance: float) -> None:
     job = {"version": 1, "tolerance": tolerance}

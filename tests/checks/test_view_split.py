@@ -83,6 +83,7 @@ def test_two_surfaces_over_the_same_skin_are_told_in_any_order() -> None:
     assert ((label == 1) == (view == 1))[told].mean() > 0.9
 
 
+@pytest.mark.variants(6)
 @pytest.mark.parametrize("name", ["rib_bracket", "cuboid", "gear"])
 @pytest.mark.parametrize("order", ["views", "shuffled", "swept"])
 @pytest.mark.parametrize("wear", [0.0, 2.0])

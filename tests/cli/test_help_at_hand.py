@@ -177,7 +177,7 @@ def read_rows() -> list[tuple[str, list[str], list[str]]]:
         "validate {0}/job.yaml",
         "verify {0}/out/job",
         "explain noise",
-        "doctor --quick",
+        pytest.param("doctor --quick", marks=pytest.mark.slow),
         "stages",
         "plugins",
         "machine list",

@@ -33,6 +33,7 @@ def told(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder / "out/job", said
 
 
+@pytest.mark.slow
 def test_surplus_is_in_the_table_and_the_report(told: tuple[Path, str]) -> None:
     out, said = told
     jsonschema = import_or_skip("jsonschema")

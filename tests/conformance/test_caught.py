@@ -224,7 +224,9 @@ def test_a_wrong_type(name: str, tmp_path: Path) -> None:
         make_checks(name, tmp_path, lambda result, given: SimpleNamespace()).test_gives_its_type()
 
 
-@pytest.mark.parametrize("name", sorted(GOOD.keys() - {"Part"}))
+@pytest.mark.parametrize(
+    "name", [*sorted(GOOD.keys() - {"Part", "Path"}), pytest.param("Path", marks=pytest.mark.slow)]
+)
 def test_an_edited_input(name: str, tmp_path: Path) -> None:
     with pytest.raises(AssertionError):
         make_checks(name, tmp_path, edit_input).test_leaves_its_inputs()

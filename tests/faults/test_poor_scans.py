@@ -40,6 +40,7 @@ SLOW = pytest.mark.slow
 KINDS = [(name, "0.2") for name in POOR] + [pytest.param(name, "auto", marks=SLOW) for name in POOR]
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize(("name", "tolerance"), KINDS)
 def test_no_damage_is_found_in_next_to_nothing(name: str, tolerance: str, tmp_path: Path) -> None:
     job = damaged_box.JOB.replace("tolerance: 0.2", f"tolerance: {tolerance}")

@@ -59,7 +59,7 @@ def test_leaving_one_out_tells_the_error() -> None:
     assert not errors.beyond[:, ~HIDDEN].any()
 
 
-@pytest.mark.variants(1)
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [4, 12])
 def test_intervals_hold_over_many_families(count: int) -> None:
     """Parts that differ in four ways, of which one begins where they are hidden."""

@@ -29,6 +29,7 @@ def scan(name, count, sigma, seed=0):
     return points + noise[:, None] * mesh.face_normals[face]
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("name", sorted(PARTS))
 @pytest.mark.parametrize("relative", [2e-4, 5e-4, 2e-3])
 def test_noise_is_recovered_on_edges_and_curves(name, relative):
@@ -76,6 +77,7 @@ def test_spacing_of_scan_lines_is_between_the_lines():
     assert 0.4 <= measure_noise_and_spacing(lines)[1] <= 1.3
 
 
+@pytest.mark.slow
 def test_noise_and_spacing_scale_with_the_unit_and_not_with_the_place():
     points = scan("block", 30_000, 0.05)
     noise, spacing = measure_noise_and_spacing(points)

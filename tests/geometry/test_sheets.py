@@ -31,7 +31,7 @@ def measure_thick_wall(spacing: float) -> tuple[float, float]:
     return measure_noise_and_spacing(scan_wall(30.0, spacing))
 
 
-@pytest.mark.variants(4)
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("radius", [0.0, 25.0])
 @pytest.mark.parametrize(("thick", "spacing"), [(4.8, 3.0), (2.0, 1.5), (1.5, 1.0)])
 def test_noise_and_spacing_are_those_of_one_skin(thick: float, spacing: float, radius: float) -> None:

@@ -23,7 +23,7 @@ def draw_skin(rng: np.random.Generator, in_rows: bool) -> Floats:
     return np.column_stack([flat, 0.004 * (flat[:, 0] - 20) ** 2])
 
 
-@pytest.mark.variants(6)
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("seed", range(60))
 def test_copies_count_as_one_point(seed: int) -> None:
     rng = np.random.default_rng(seed)

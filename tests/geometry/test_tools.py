@@ -11,6 +11,7 @@ from damageest.geometry.vectors import normalise
 from tests.path_shapes import dent, plan
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("axis", [(0, 0, 1), (1, 0, 0), (0.3, -0.5, 0.7)])
 def test_beam_and_nozzle_lie_along_the_axis(axis: tuple[float, float, float]) -> None:
     path, way = plan(dent()), normalise(np.array([axis], float))[0]

@@ -108,6 +108,7 @@ def test_an_adapted_part_that_takes_the_datums_along_is_told(shift: float, is_to
         assert all(note.amount == pytest.approx(shift) for note in notes)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("datum", [DATUMS, LIST], ids=["system", "list"])
 def test_a_part_as_designed_keeps_its_datums(datum: Any, registry: Registry) -> None:
     held = run_until_adapted(draw_bent(), registry, datum, "none")

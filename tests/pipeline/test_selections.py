@@ -90,6 +90,7 @@ def pocket(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
+@pytest.mark.slow
 @needs_plugin("cadquery")
 @pytest.mark.parametrize(
     ("where", "message"),

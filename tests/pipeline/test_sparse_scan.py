@@ -24,6 +24,7 @@ def lost(request: pytest.FixtureRequest) -> tuple[Result, float]:
     return run(scan(block() - pocket(DEPTH), noise), tolerance, adapt="none", allowance="none"), noise
 
 
+@pytest.mark.variants(1)
 def test_a_shallow_loss_holds_little_intact_metal(lost: tuple[Result, float]) -> None:
     (site,) = lost[0].sites
     truth = to_manifold(as_solid(block() ^ pocket(DEPTH)))

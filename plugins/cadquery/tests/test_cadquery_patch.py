@@ -99,6 +99,7 @@ def test_the_deviation_is_the_true_one_both_ways() -> None:
     assert _spline._measure_deviation(dented, surface, knots, poles) == pytest.approx(0.5, abs=0.03)
 
 
+@pytest.mark.slow
 def test_what_is_no_height_field_or_too_sharp_says_so() -> None:
     import trimesh
 

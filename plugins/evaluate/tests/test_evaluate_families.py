@@ -18,6 +18,7 @@ def measure_off(draw: Draw) -> np.ndarray:
     return distance_to_mesh(move_points(draw.scan.points, draw.pose), draw.part)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("seed", [0, 12, 15, 24])
 def test_a_wall_is_scanned_where_it_is_left(seed: int) -> None:
     draw = FAMILIES["walls"][1](seed)

@@ -67,6 +67,7 @@ def test_a_refusal_is_shown_with_its_reason() -> None:
     assert re.search(r"\| repair \| none \| refused \[1\] \|", make_matrix_table([cells[1]]))
 
 
+@pytest.mark.slow
 def test_a_jobs_own_result_stands_for_a_truth_that_is_not_known(tmp_path: Path, registry: Registry) -> None:
     scene = prepare_matrix_job(damaged_box.write_least(tmp_path), registry, tmp_path / "scene")
     assert scene.name == "job*"

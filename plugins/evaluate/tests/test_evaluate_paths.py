@@ -58,6 +58,7 @@ def test_the_check_sees_beads_and_beam_in_metal() -> None:
     assert measure_shaded(tilted, loss.left, path.width / 4) > 0.05
 
 
+@pytest.mark.slow
 def test_the_check_sees_a_rotary_axis_that_flips() -> None:
     _, path = plan_dent()
     assert count_flips(path) == 0

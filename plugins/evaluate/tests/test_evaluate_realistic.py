@@ -50,6 +50,7 @@ def test_cases_are_chosen_by_name_number_and_share() -> None:
         parse_numbers("--case", "one")
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("name", list(SENSORS))
 def test_a_scan_deviates_by_the_resolution_of_its_sensor(name: str) -> None:
     """Without a loss: the median deviation, which outliers do not change, is that of the noise that is stated."""

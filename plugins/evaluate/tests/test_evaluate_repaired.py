@@ -20,6 +20,7 @@ def test_sites_lie_on_the_skin_and_are_lost(seed: int) -> None:
     assert whole.volume - work.lose().volume() > 100
 
 
+@pytest.mark.variants(4)
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_a_kind_is_wrong_where_it_says(kind: str) -> None:
     work = make_workpiece(1)

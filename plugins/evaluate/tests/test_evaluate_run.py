@@ -35,6 +35,7 @@ def ran(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return keys
 
 
+@pytest.mark.slow
 def test_rows_on_file_are_not_run_again_and_new_ones_are_appended(tmp_path: Path, ran: list[str]) -> None:
     out = tmp_path / "cases.jsonl"
     told: list[dict[str, Any]] = []

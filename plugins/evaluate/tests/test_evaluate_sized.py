@@ -8,6 +8,7 @@ from damageest_evaluate.sized import DEPTH_ERROR, SIZED, make_sized_damage
 from damageest.geometry.solids import to_manifold
 
 
+@pytest.mark.variants(2)
 @pytest.mark.parametrize("kind", SIZED)
 @pytest.mark.parametrize("deep", [0.1, 3.0])
 def test_a_loss_is_as_deep_as_asked_for(kind: str, deep: float) -> None:

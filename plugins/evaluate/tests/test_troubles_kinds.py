@@ -38,7 +38,7 @@ DEAR = ("wear: bore", "wear: half a shaft", "wear: one side of a journal")
 """Each takes 2 s and more to make."""
 
 
-@pytest.mark.variants(20)
+@pytest.mark.variants(10)
 @pytest.mark.parametrize(
     "case",
     [pytest.param(case, marks=[pytest.mark.slow] if case.kind in DEAR else [], id=case.kind) for case in FIRST],

@@ -66,6 +66,7 @@ def test_every_site_is_in_an_enclosure_and_enclosures_are_disjoint() -> None:
     assert (first ^ second).volume() == pytest.approx(0, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_void_outside_the_part_is_only_taken_near_the_loss() -> None:
     (item,), truth = enclose("pit").items, scene("pit").truth
     assert np.abs(item.solid.bounds - truth.bounds).max() < 6 * CELL

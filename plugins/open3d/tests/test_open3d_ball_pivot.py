@@ -58,12 +58,14 @@ def test_normals_toward_the_lost_material(surface: Surface) -> None:
     assert (np.einsum("ij,ij->i", surface.cross, inward) > 0).mean() > 0.99
 
 
+@pytest.mark.slow
 def test_same_points_same_bytes(surface: Surface) -> None:
     again = BallPivot().run(bowl(), box(), TOLERANCE, 0.15, NOISE)
     assert again.vertices.tobytes() == surface.vertices.tobytes()
     assert again.faces.tobytes() == surface.faces.tobytes()
 
 
+@pytest.mark.slow
 def test_far_from_the_origin() -> None:
     away, part = np.array([1e5, -2e5, 3e5]), box()
     moved = BallPivot().run(bowl() + away, Part(part.vertices + away, part.faces), TOLERANCE, 0.15, NOISE)
@@ -71,6 +73,7 @@ def test_far_from_the_origin() -> None:
     assert np.sqrt((off**2).mean()) < 0.6 * NOISE
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("share", [1.0, 0.1])
 def test_a_hollow_is_as_deep_as_it_is_also_where_a_half_is_sparse(share: float) -> None:
     """Chords would make it shallower, where the points are sparse by many times as much."""

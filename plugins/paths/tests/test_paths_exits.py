@@ -72,6 +72,7 @@ def test_where_the_sides_are_shut_the_tool_leaves_along_its_axis() -> None:
     assert measure_nozzle(path, loss.left, 0.1) > 0
 
 
+@pytest.mark.slow
 def test_the_check_would_see_a_way_through_the_wall() -> None:
     loss, path = plan_fork(5)
     points = path.points.copy()

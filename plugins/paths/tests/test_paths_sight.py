@@ -66,6 +66,7 @@ def test_no_metal_is_in_the_beam(name: str) -> None:
     assert measure_beam(path, loss.left) == 0
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("name", CASES)
 def test_beads_lie_on_the_deposit(name: str) -> None:
     """Their middles are not in intact metal, and none is in the air."""

@@ -47,6 +47,7 @@ def made(request: pytest.FixtureRequest) -> tuple[str, Surface]:
     return request.param, reconstruct(request.param)
 
 
+@pytest.mark.variants(1)
 def test_averages_the_noise(made: tuple[str, Surface]) -> None:
     off = np.linalg.norm(made[1].vertices - [0, 0, TOP], axis=1) - RADIUS
     assert np.sqrt((off**2).mean()) < 0.6 * NOISE

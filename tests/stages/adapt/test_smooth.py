@@ -84,6 +84,7 @@ def test_the_field_has_no_rigid_part_over_the_seen_skin() -> None:
     assert np.abs(turn).max() < 0.05 * PART.diagonal * adapted.amount
 
 
+@pytest.mark.slow
 def test_its_field_says_where_each_place_went() -> None:
     adapted, _ = adapt("sphere", bend=1.0)
     assert adapted is not None

@@ -12,6 +12,7 @@ from damageest.stages.align._field import NEAR, PartSurface
 from damageest.stages.align._prepare_part import prepare_part
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize(
     "body",
     [

@@ -42,6 +42,7 @@ def plate(
     return Scan(points), Deviation(z, np.zeros(n, int), label), pit
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("n", [150_000, 1_000_000])
 @pytest.mark.parametrize("shift", [0.0, SIGMA])
 @pytest.mark.parametrize("outliers", [0.0, 0.01])

@@ -69,6 +69,7 @@ def test_a_rim_that_runs_over_the_boxs_edge(part: Part) -> None:
         assert volume(mesh, part) == pytest.approx(np.pi * 6**3 / 3, rel=0.015)
 
 
+@pytest.mark.slow
 @settings(max_examples=12)
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0, 1))
 def test_where_the_border_lies_in_metal_it_is_known(y: float, z: float, x: float) -> None:
@@ -156,6 +157,7 @@ def test_the_enclosure_reaches_the_background_and_leaves_it_nowhere(part: Part) 
     assert (mesh.bounds[0] > held.bounds[0] - 1e-6).all()
 
 
+@pytest.mark.slow
 def test_metal_beyond_the_background_is_not_lost(part: Part) -> None:
     """A printer's volume that ends within the pit."""
     box = trimesh.creation.box((100, 30, 60))
@@ -166,6 +168,7 @@ def test_metal_beyond_the_background_is_not_lost(part: Part) -> None:
     assert volume(mesh, part) == pytest.approx(np.pi * 6**3 / 3, rel=0.01)
 
 
+@pytest.mark.slow
 def test_a_shallow_bowl_whose_rim_nearly_lies_in_the_skin(part: Part) -> None:
     """Its own direction leaves the part only far away: the way out is the shortest one."""
     ball = bowl(60, 10 + 60 - 1.2, TOLERANCE)

@@ -80,6 +80,7 @@ def read_blocks(text: str) -> Floats:
     return np.array(rows)
 
 
+@pytest.mark.variants(1)
 @pytest.mark.parametrize("tilted", [False, True])
 def test_the_apt_gives_the_points_of_the_csv(tilted: bool, tmp_path: Path) -> None:
     path = make_path(tilted)

@@ -80,6 +80,7 @@ def test_uneven_density_is_no_opening(tmp_path: Path) -> None:
     assert not [note for note in part.notes if "openings" in note]
 
 
+@pytest.mark.slow
 def test_walls_thinner_than_the_scan_resolves_are_refused(tmp_path: Path) -> None:
     sheet = trimesh.creation.box((40, 30, 0.6))
     scanner = Simulate.model_validate({"points": 8000, "noise": 0.03})

@@ -25,6 +25,7 @@ PARTS = {
 }
 
 
+@pytest.mark.variants(3)
 @pytest.mark.parametrize("name", PARTS)
 @pytest.mark.parametrize("tolerance", [0.5, 4.0])
 def test_no_gap_above_the_stated_spacing(name: str, tolerance: float) -> None:

@@ -138,6 +138,7 @@ def test_garbage_is_refused_by_name_or_read_as_numbers(suffix, garbage, tmp_path
         assert cloud.points.shape[1] == 3
 
 
+@pytest.mark.variants(19)
 @pytest.mark.parametrize("name", [*sorted(WRITERS), "scan.las", "scan.laz", "scan.e57"])
 @given(data=st.data())
 @quick
@@ -280,6 +281,7 @@ def test_lzf_references_may_overlap_what_they_write():
         _unpack_lzf(bytes([7 << 5, 0, 9]), 10)
 
 
+@pytest.mark.slow
 def test_a_million_points_read_fast(tmp_path):
     points = np.random.default_rng(0).normal(size=(1_000_000, 3))
     path = tmp_path / "million.ply"
