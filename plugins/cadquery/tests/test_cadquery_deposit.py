@@ -178,7 +178,7 @@ def test_deposits_are_written_with_offset_faces(done: Run) -> None:
         assert measure_volume(solid.wrapped) == pytest.approx(exact["volume"], rel=1e-6)
         assert solid.BoundingBox().zmax == pytest.approx(6 + HIGH, abs=1e-6)
         assert site.deposit is not None
-        assert site.deposit.volume == pytest.approx(exact["volume"], rel=0.005), "both are as high as the job asks"
+        assert site.deposit.volume == pytest.approx(exact["volume"], rel=0.015), "both are as high as asked"
         assert exact["distance"] <= done.result.tolerance / 4
         assert len(solid.Faces()) == exact["faces"] < 20
     stock = done.said[0]["exact"]["deposit"]["volume"] - done.said[0]["exact"]["volume"]
@@ -260,14 +260,14 @@ def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None
         bases = take_bases(piece, {top: height})
         return compare_stock([piece], bases, build_parts(bases), to, site.damage, part, 0.2)
 
-    _, farthest, difference = compare(high + 0.05)
+    _, farthest, difference = compare(high)
     assert farthest > 0.3, "the mesh ends elsewhere"
     assert 0.01 < difference < 0.05
     with pytest.raises(StockError, match=r"mesh's|differs"):
-        compare(high + 0.12)
+        compare(high + 0.07)
     # something took a part of the mesh's stock away: on the exact one it would be there
     with pytest.raises(StockError, match=r"mesh's|differs"):
-        compare(high + 0.05, replace(deposit, stock_volume=0.98 * deposit.stock_volume))
+        compare(high, replace(deposit, stock_volume=0.98 * deposit.stock_volume))
 
 
 @pytest.mark.slow
