@@ -6,8 +6,9 @@ process of its own, so that its peak memory can be measured.
 
 from __future__ import annotations
 
+import os
+import shutil
 import tempfile
-import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -16,14 +17,16 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Part, Scan, Solid
 from damageest.errors import DamageestError, Fault, JobError
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import STAGES
-from damageest_evaluate.matrix_job import MatrixJob, make_settings, prepare_matrix_job
+from damageest_evaluate.matrix_job import MatrixJob, load_scene, make_settings, prepare_matrix_job
 from damageest_evaluate.memory import PeakMemory
 from damageest_evaluate.processes import run_in_process
 from damageest_evaluate.scores import score
+
+DEFAULT = "default of each stage"
+"""What the cells are named that no implementation was chosen for."""
 
 
 @dataclass(frozen=True)
@@ -31,8 +34,8 @@ class MatrixCell:
     """One implementation on one job.
 
     ``refused``: the reason if there is no result (``iou`` is NaN), or none for some sites. ``flagged``: the result's
-    own checks failed. ``volume``: found for true. ``stage_seconds``: time in the stage; ``seconds``: time of the run;
-    ``megabytes``: peak memory.
+    own checks failed. ``volume``: found for true. ``stage_seconds``: time in the stage; ``seconds``: processor
+    time of the run, without the stages up to the sites where another cell computed them; ``megabytes``: peak memory.
     """
 
     stage: str
@@ -59,10 +62,11 @@ def run_matrix(
     if unknown := [stage for stage in stages if stage not in STAGES]:
         raise JobError([Fault(f"no stage '{unknown[0]}'; there are: {', '.join(STAGES)}")], "matrix")
     with tempfile.TemporaryDirectory(prefix="damageest-matrix-") as folder:
-        scenes = [prepare_matrix_job(path, registry, Path(folder) / str(k)) for k, path in enumerate(jobs)]
         items = [item for stage in STAGES if not stages or stage in stages for item in registry.of(stage)]
         with ThreadPoolExecutor(workers) as pool:
-            pairs = [(item, scene) for item in items for scene in scenes]
+            places = [Path(folder) / str(k) for k in range(len(jobs))]
+            scenes = list(pool.map(prepare_matrix_job, jobs, [registry] * len(jobs), places))
+            pairs = [(item, scene) for item in (None, *items) for scene in scenes]
             futures = [pool.submit(_run_cell, item, scene, timeout) for item, scene in pairs]
             cells = []
             for future in futures:
@@ -71,13 +75,13 @@ def run_matrix(
     return cells
 
 
-def _run_cell(item: Implementation, scene: MatrixJob, timeout: float) -> MatrixCell:
-    """One implementation on one job, run in a process of its own."""
-    name = (item.contract.stage, item.name, scene.name)
+def _run_cell(item: Implementation | None, scene: MatrixJob, timeout: float) -> MatrixCell:
+    """One implementation, or the default of each stage (None), on one job, run in a process of its own."""
+    name = (item.contract.stage if item else "", item.name if item else DEFAULT, scene.name)
     settings = make_settings(item, scene)
     if isinstance(settings, str):
         return MatrixCell(*name, float("nan"), refused=settings)
-    case = {"folder": str(scene.folder), "stage": item.contract.stage, "use": item.name, **settings}
+    case = {"folder": str(scene.folder), "stage": name[0], **settings}
     row = run_in_process(run_one, {"case": case}, timeout)
     return MatrixCell(*name, **row) if isinstance(row, dict) else MatrixCell(*name, float("nan"), refused=row)
 
@@ -92,23 +96,22 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     import damageest
 
     folder = Path(case["folder"])
-    data = np.load(folder / "scene.npz")
-    part = Part(data["vertices"], data["faces"], unit=str(data["unit"]))
-    lost, pose = Solid(data["lost"], data["lost_faces"]), data["pose"]
-    start = time.perf_counter()
+    part, scan, lost, pose = load_scene(folder, np.array(case["moved"]))
+    own = Path(tempfile.mkdtemp(dir=folder))
+    shutil.copytree(folder / "early", own, dirs_exist_ok=True)
+    start = _measure_processor_seconds()
     row: dict[str, Any] = {"iou": float("nan")}
     given: dict[str, Any] = {} if case["own_part"] else {"part": part}
-    if not case["own_scan"]:
-        move = np.array(case["moved"])
-        given["scan"] = Scan(data["points"], unit=str(data["unit"])).move(move)
-        pose = pose @ np.linalg.inv(move)
+    given |= {} if case["own_scan"] else {"scan": scan}
     try:
-        writes = case["stage"] in ("export", "report")
-        result = damageest.run(case["job"], output=folder / "out" if writes else False, **given)
+        settings = [] if case["stage"] == "report" else ["report=none"]
+        result = damageest.run(case["job"], output=own, settings=settings, **given)
     except DamageestError as error:
         row["refused"] = _shorten_reason(str(error))
-        return row | {"seconds": time.perf_counter() - start}
-    row["seconds"] = time.perf_counter() - start
+        return row | {"seconds": _measure_processor_seconds() - start}
+    finally:
+        shutil.rmtree(own)
+    row["seconds"] = _measure_processor_seconds() - start
     row["stage_seconds"] = sum(record.seconds for record in result.stages if record.stage == case["stage"])
     row["megabytes"] = memory.take_peak()
     solids = [site.damage for site in result.sites]
@@ -118,6 +121,11 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     if result.failures:
         row["refused"] = _shorten_reason(result.failures[0])
     return row
+
+
+def _measure_processor_seconds() -> float:
+    """Of this process and of those it started that have ended."""
+    return sum(os.times()[:4])
 
 
 def _shorten_reason(text: str) -> str:

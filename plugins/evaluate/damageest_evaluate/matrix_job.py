@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ import numpy as np
 
 from damageest import read_inputs, run
 from damageest.artefacts import Floats, Part, Scan, Solid
-from damageest.errors import Fault, JobError
+from damageest.errors import Fault, JobError, StageError
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.io.meshes import write_points, write_stl
 from damageest.job import load
@@ -25,6 +26,8 @@ from damageest.stages.scan import ReadScan
 
 KEPT = (Align, Adapt)
 """Contracts whose implementation stays that of the job: without it, its scan would not fit its part."""
+EARLY = ("part-", "scan-", "measure_scan-", "sample-", "align-", "adapt-", "segment-", "cluster-")
+"""What names the entries that the cells of the later stages share."""
 OFF_DEGREES, OFF_SHARE = 3.0, 0.01
 """Rotation, and shift as a share of the part's diagonal, of the scan for an `align` that needs a start pose."""
 
@@ -71,6 +74,7 @@ def prepare_matrix_job(path: Path, registry: Registry, folder: Path) -> MatrixJo
     _write_scans(part, scan, folder)
     kept = {one.stage: job.stages[one].model_dump(mode="json") for one in KEPT}
     values = {"version": 1, "units": job.units, "tolerance": job.tolerance or "auto", **kept}
+    _compute_early_stages(values, folder, registry)
     values["scan"] = job.stages[ReadScan].model_dump(mode="json")
     return MatrixJob(
         job.name if known else f"{job.name}*",
@@ -80,6 +84,25 @@ def prepare_matrix_job(path: Path, registry: Registry, folder: Path) -> MatrixJo
         part.bounds,
         pose,
     )
+
+
+def load_scene(folder: Path, move: Floats) -> tuple[Part, Scan, Solid, Floats]:
+    """Part, scan moved by ``move`` (4,4), true damage and true pose of that scan, as a matrix job keeps them."""
+    data = np.load(folder / "scene.npz")
+    unit = str(data["unit"])
+    part, scan = Part(data["vertices"], data["faces"], unit=unit), Scan(data["points"], unit=unit)
+    return part, scan.move(move), Solid(data["lost"], data["lost_faces"]), data["pose"] @ np.linalg.inv(move)
+
+
+def _compute_early_stages(values: Mapping[str, Any], folder: Path, registry: Registry) -> None:
+    """Leaves in ``folder``/early what the stages up to the sites give, for the cells to start from."""
+    part, scan, _, _ = load_scene(folder, np.eye(4))
+    settings = ["method=surface", "report=none", "accept=all"]
+    with contextlib.suppress(StageError):  # what a site fails with is said by the cells
+        run(values, part=part, scan=scan, settings=settings, registry=registry, output=folder / "early")
+    for entry in (folder / "early" / "stages").glob("*"):
+        if not entry.name.startswith(EARLY):
+            entry.unlink()
 
 
 def _run_default(path: Path, registry: Registry) -> tuple[Solid, Floats]:
@@ -97,11 +120,14 @@ def _write_scans(part: Part, scan: Scan, folder: Path) -> None:
         write_points(folder / f"{name}.ply", {"x": x, "y": y, "z": z})
 
 
-def make_settings(item: Implementation, scene: MatrixJob) -> dict[str, Any] | str:
-    """The inputs of `matrix.run_one` with this implementation, or the reason if it does not apply to the job."""
+def make_settings(item: Implementation | None, scene: MatrixJob) -> dict[str, Any] | str:
+    """The inputs of `matrix.run_one` with this implementation, or with the default of each stage (None); or the reason
+    if it does not apply to the job."""
+    job: dict[str, Any] = {key: value for key, value in scene.values.items() if key != "scan"}
+    if item is None:
+        return {"job": job, "own_part": False, "own_scan": False, "moved": np.eye(4).tolist()}
     stage, use = item.contract.stage, item.name
     options: dict[str, Any] = {"use": use}
-    job: dict[str, Any] = {key: value for key, value in scene.values.items() if key != "scan"}
     own_part, own_scan, moved = item.contract is ReadPart, item.contract is ReadScan, np.eye(4)
     if stage == "part":
         choices = {"file": "part.stl", "reconstruct": "specimen.ply", "earlier_scan": "specimen.ply"}

@@ -26,11 +26,13 @@ def make_marks(kind: str) -> tuple[str, str]:
 
 OFF = 0.03
 """Relative error of a volume from which the matrix shows it."""
+LEAST_SHARE = 0.97
+"""Intersection over union, as a share of that of the default stages, below which the table names an implementation."""
 MATRIX = (
     "Columns with a job's name: intersection over union of found and true damage, with a star of found damage and that "
     "of the job's own stages; volume: found for true, where it is off by more than 3 %; flagged: a check of the result "
-    "failed. stage, s and run, s: median seconds of the stage and of the whole run. peak, MB: the largest peak memory "
-    "of a run"
+    "failed. stage, s: median seconds of the stage. run, s: median processor seconds of a run, without the stages up "
+    "to the sites where these are those of the job. peak, MB: the largest peak memory of a run"
 )
 
 
@@ -57,6 +59,8 @@ def make_matrix_table(cells: Sequence[MatrixCell], legend: bool = True) -> str:
         lines.append([stage if stage != before else "", use, *shown, *figures])
         before = stage
     notes = [f"{number}. {reason}" for number, reason in enumerate(reasons, 1)]
+    if off := _list_off(cells):
+        notes += ["", f"IoU below {LEAST_SHARE} of that of the defaults, or volume more than 3 % off theirs: {off}."]
     about = describe_measurement(MATRIX if legend else "")
     return "\n".join([format_markdown(lines, 2), "", about, *(["", *notes] if notes else [])])
 
@@ -65,6 +69,17 @@ def format_markdown(lines: Sequence[Sequence[str]], names: int = 1) -> str:
     """A Markdown table; the first line is the head. All columns after the first ``names`` are aligned to the right."""
     rule = ["---"] * names + ["---:"] * (len(lines[0]) - names)
     return "\n".join("| " + " | ".join(words) + " |" for words in (lines[0], rule, *lines[1:]))
+
+
+def _list_off(cells: Sequence[MatrixCell]) -> str:
+    """The cells with a result that is not that of the default stages."""
+    usual = {cell.job: cell for cell in cells if not cell.stage}
+    return ", ".join(
+        f"{cell.stage}: {cell.use} on {cell.job}"
+        for cell in cells
+        if (own := usual.get(cell.job)) and cell.iou == cell.iou
+        and (cell.iou < LEAST_SHARE * own.iou or abs(cell.volume - own.volume) > OFF * own.volume)
+    )  # fmt: skip
 
 
 def _format_cell(cell: MatrixCell, reasons: list[str]) -> str:
