@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh, Part, Surface
 from damageest.errors import StageError
+from damageest.geometry.bodies import label_pieces
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.solids import compose_shells, to_arrays, to_manifold
@@ -56,7 +57,7 @@ def divide_part(part: Part, sheet: Sheet, intact: Floats, side: str, tolerance: 
     for wide in OPENED if len(sheet.places) else OPENED[:1]:
         bodies = (body - _make_balls(sheet.places - origin, wide * sheet.deep)).decompose()
         meshes = [Mesh(*to_arrays(one, origin)) for one in bodies]
-        area = np.array([_measure_sides(mesh, sheet, tolerance) for mesh in meshes])
+        area = _align_sides(np.array([_measure_sides(mesh, sheet, tolerance) for mesh in meshes]))
         if area.min(axis=1).max(initial=0.0) < MOST_BOTH * sheet.mesh.area:  # a pocket in a fold has both sides
             break
     else:
@@ -111,14 +112,28 @@ def _make_balls(places: Floats, radius: Floats) -> Any:
     return Manifold.batch_boolean(balls or [Manifold()], OpType.Add)
 
 
-def _measure_sides(mesh: Mesh, sheet: Sheet, tolerance: float) -> tuple[float, float]:
-    """The area of a body's faces on the front and on the back of the damage surface, without what extends it."""
+def _measure_sides(mesh: Mesh, sheet: Sheet, tolerance: float) -> Floats:
+    """(P,2) the area of a body's faces on the front and on the back of each piece of the damage surface, without what
+    extends it."""
     distance, face, _ = closest_on_mesh(mesh.triangles.mean(axis=1), sheet.mesh)
     at = np.flatnonzero((distance < 3 * THIN * tolerance) & (face < len(sheet.own.faces)))
     own, other = mesh.cross[at], sheet.mesh.cross[face[at]]
     size = np.linalg.norm(own, axis=1)
     lean = np.einsum("ij,ij->i", own, other) / np.maximum(size * np.linalg.norm(other, axis=1), 1e-300)
-    return float(size[lean < -0.9].sum() / 2), float(size[lean > 0.9].sum() / 2)
+    piece = label_pieces(sheet.own.faces)
+    label, count = piece[face[at]], int(piece.max()) + 1
+    sides = [np.bincount(label, np.where(which, size / 2, 0), count) for which in (lean < -0.9, lean > 0.9)]
+    return np.stack(sides, axis=1)
+
+
+def _align_sides(area: Floats) -> Floats:
+    """(B,2) the area of each body on the two sides of the damage surface, from that by piece (B,P,2).
+
+    Pieces that bound a loss together, as the two ends of a bar that is gone, may face opposite ways. They are turned so
+    that the same bodies lie before them: the signs of the strongest pattern of the differences.
+    """
+    turned = np.linalg.svd(area[..., 0] - area[..., 1])[2][0] < 0
+    return np.asarray(np.where(turned[:, None], area[..., ::-1], area).sum(axis=1))
 
 
 def _choose_side(

@@ -14,7 +14,7 @@ from damageest.artefacts import Mesh, Part, Solid, Surface, open_edges
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.loops import trace_loops
-from damageest.geometry.solids import to_manifold
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.background.bbox import BoundingBox
 from damageest.stages.background.capsule import Capsule
 from damageest.stages.background.minkowski import Minkowski
@@ -178,3 +178,37 @@ def test_a_shallow_bowl_whose_rim_nearly_lies_in_the_skin(part: Part) -> None:
     mesh = enclose(part, Surface(cut.vertices, cut.faces), sample_intact(part, radius))
     true = np.pi * 1.2**2 * (60 - 1.2 / 3)
     assert volume(mesh, part) == pytest.approx(true, rel=0.1)
+
+
+@pytest.mark.parametrize("turned", [(False, False), (True, False), (False, True), (True, True)])
+def test_pieces_that_bound_a_loss_together_may_face_any_way(turned: tuple[bool, bool]) -> None:
+    """A ring whose one bar is cut out: neither end divides the ring, and nobody knows which way each surface faces."""
+    ring = to_manifold(Solid(*_make_box((40, 30, 4))), np.zeros(3)) - to_manifold(
+        Solid(*_make_box((32, 22, 6))), np.zeros(3)
+    )
+    vertices, faces = to_arrays(ring, np.zeros(3))
+    part = Part(vertices, faces)
+    pieces = [_make_end(x, flip) for x, flip in zip((-4.0, 5.0), turned, strict=True)]
+    count = len(pieces[0].vertices)
+    surface = Surface(
+        np.concatenate([one.vertices for one in pieces]), np.concatenate([pieces[0].faces, pieces[1].faces + count])
+    )
+    points, _ = trimesh.sample.sample_surface(trimesh.Trimesh(vertices, faces), 6000, seed=2)
+    is_gone = (points[:, 0] > -4.5) & (points[:, 0] < 5.5) & (points[:, 1] > 0)
+    mesh = enclose(part, surface, np.asarray(points[~is_gone]))
+    assert open_edges(mesh.faces) == 0
+    assert volume(mesh, part) == pytest.approx(9 * 4 * 4, rel=0.01)
+
+
+def _make_box(size: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    box = trimesh.creation.box(size)
+    return np.asarray(box.vertices), np.asarray(box.faces)
+
+
+def _make_end(x: float, turned: bool) -> Surface:
+    """The end of the upper bar at x, a tolerance inside its skin all round."""
+    y, z = np.meshgrid(np.linspace(11 + TOLERANCE, 15 - TOLERANCE, 9), np.linspace(-2 + TOLERANCE, 2 - TOLERANCE, 9))
+    at = np.stack([np.full(81, x), y.ravel(), z.ravel()], axis=1)
+    first = (np.arange(8)[:, None] * 9 + np.arange(8)).ravel()
+    faces = np.concatenate([first[:, None] + [0, 1, 9], first[:, None] + [1, 10, 9]])
+    return Surface(at, faces[:, ::-1] if turned else faces)
