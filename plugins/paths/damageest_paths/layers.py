@@ -18,6 +18,13 @@ from damageest_paths.channels import SPEED, ProcessTable, list_channels
 from damageest_paths.mesh_files import find_mesh_fault, read_mesh_file
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+Angle = Annotated[float, Field(allow_inf_nan=False)]
+
+
+class StartPlace(Options):
+    """A place in part coordinates."""
+
+    at: Vector = Field(description="[x, y, z] near to which rings and spirals begin")
 
 
 def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto", "normal"] | Vector:
@@ -112,8 +119,17 @@ class Layers(Path):
         description="zigzag: rows to and fro; contour: rings; spiral: rings linked into one pass; offset-zigzag: one "
         "ring, rows inside",
     )
-    angle: float = Field(0.0, allow_inf_nan=False, description="of the rows in the first layer, in degrees")
+    angle: Literal["auto"] | Angle = Field(
+        "auto",
+        description="of the rows in the first layer, in degrees; auto: 0, but along a region that is much longer than "
+        "wide, in every layer",
+    )
     turn: float = Field(90.0, allow_inf_nan=False, description="of the rows from layer to layer, in degrees")
+    starts: Literal["spread", "aligned"] | StartPlace = Field(
+        "spread",
+        description="where rings and spirals begin: spread: in another direction from layer to layer; aligned: in the "
+        "same; {at: [x, y, z]}: near to that place",
+    )
     overhang: float = Field(
         45.0, ge=0, lt=90, description="largest angle between build direction and an overhanging side, in degrees"
     )
@@ -228,7 +244,7 @@ class Layers(Path):
             height=self.height,
             bead=Bead(self.width, (1 - self.overlap) * self.width),
             pattern=self.pattern,
-            angle=float(np.radians(self.angle)),
+            angle=0.0 if self.angle == "auto" else float(np.radians(self.angle)),
             turn=float(np.radians(self.turn)),
             overhang=float(np.radians(self.overhang)),
             shortest=self.width / 2 if self.min_length is None else self.min_length,
@@ -244,6 +260,8 @@ class Layers(Path):
             ),
             sink=self.penetration,
             cooling=Cooling(self.interpass, self.feed, fast) if self.interpass else None,
+            is_along=self.angle == "auto",
+            starts=np.array(self.starts.at) if isinstance(self.starts, StartPlace) else self.starts,
         )
         direction: Floats | None = None
         if self.direction == "normal":

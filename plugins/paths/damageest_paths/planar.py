@@ -13,7 +13,7 @@ from damageest.geometry.solids import to_arrays
 from damageest_paths.aims import DOWN, UP, Aims, cast_shadow, find_aims, find_sink, measure_margin
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
-from damageest_paths.fill import SLIVER, WITHIN, Kind, Line, list_lines
+from damageest_paths.fill import SLIVER, WITHIN, list_lines
 from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.order import order_passes
@@ -27,6 +27,7 @@ from damageest_paths.regions import (
     shift_border,
     unite_regions,
 )
+from damageest_paths.weave import Kind, Line
 
 UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "stands on nothing within the permitted overhang",
@@ -85,7 +86,9 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         aims = find_aims(nearby, beside, wanted, (floor, top), standoff, process)
         free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
         angle = process.angle + number * process.turn
-        lines = list_lines(held ^ aims.drawn, process.pattern, process.bead, angle, free, process.shortest, firm)
+        drawn = held ^ aims.drawn
+        style = process.choose_style(number, drawn, frame)
+        lines = list_lines(drawn, process.pattern, process.bead, angle, free, process.shortest, firm, style)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = cover([line.points for line in lines if measure_length(line.points) < process.shortest], width)
         made, dropped, shaded = list[Pass](), list[Floats](), list[Floats]()

@@ -8,12 +8,14 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.fill import Kind, Pattern
 from damageest_paths.frames import Frame
 from damageest_paths.sight import Beam
 from damageest_paths.stripes import Bead
+from damageest_paths.weave import Kind, Pattern, Style
 
 Axes = Literal[3, "3+2", 5]
+GOLDEN = np.pi * (3 - np.sqrt(5.0))
+"""Turn of the direction in which rings start, from layer to layer: it comes near to no earlier one for long."""
 
 
 @dataclass(frozen=True)
@@ -36,7 +38,9 @@ class Process:
     its start and goes on beyond its end. ``turn_rate``: largest turn of the tool axis per length along a pass.
     ``is_trial``: few axes are tried. ``give_up``: the volume from which on a trial need not go on if it misses more.
     ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None: the share ``sink_share`` of the
-    height of a layer. ``cooling``: see `Cooling`; None: beads need not cool down.
+    height of a layer. ``cooling``: see `Cooling`; None: beads need not cool down. ``is_along``: long regions have their
+    rows along them. ``starts``: of rings, in directions that differ from layer to layer, or do not, or near to a point
+    (3,) of the part.
     """
 
     height: float
@@ -57,6 +61,16 @@ class Process:
     sink: float | None = None
     sink_share: float = 0.45
     cooling: Cooling | None = None
+    is_along: bool = True
+    starts: Literal["spread", "aligned"] | Floats = "spread"
+
+    def choose_style(self, layer: int, region: Any, frame: Frame) -> Style:
+        """How rows and rings of a layer run in a region of a plane across the frame's z."""
+        if isinstance(self.starts, str):
+            return Style(self.is_along, layer * GOLDEN if self.starts == "spread" else 0.0)
+        left, low, right, high = region.bounds()
+        x, y, _ = frame.to_local(self.starts)
+        return Style(self.is_along, float(np.arctan2(y - (low + high) / 2, x - (left + right) / 2)))
 
     @property
     def step(self) -> float:

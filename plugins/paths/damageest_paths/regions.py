@@ -14,6 +14,8 @@ from damageest.artefacts import Flags, Floats
 
 ROUND = 24
 """Corners of a full circle where a bead's end is drawn as a polygon."""
+SAME = 0.002
+"""Bead widths by which a corner may lie beside a line and be left out where its bead is drawn."""
 CHUNK = 1000
 """Points that are compared with all sides of a region at once."""
 
@@ -57,8 +59,27 @@ def cover(lines: Sequence[Floats], width: float) -> Any:
     """The region that beads of a width cover whose centre lines are the polylines (K,2). Their ends are round."""
     from manifold3d import CrossSection, FillRule
 
-    outlines = [outline for line in lines for outline in _outline(line, width / 2)]
+    outlines = [outline for line in lines for outline in _outline(thin_line(line, SAME * width), width / 2)]
     return CrossSection(outlines, FillRule.NonZero) if outlines else CrossSection()
+
+
+def thin_line(line: Floats, off: float) -> Floats:
+    """A polyline (K,2) without corners that lie ``off`` beside it at most (Douglas and Peucker 1973)."""
+    kept = np.zeros(len(line), bool)
+    kept[[0, -1]] = True
+    todo = [(0, len(line) - 1)]
+    while todo:
+        low, high = todo.pop()
+        if high - low < 2:
+            continue
+        way, away = line[high] - line[low], line[low + 1 : high] - line[low]
+        share = np.clip(away @ way / max(float(way @ way), 1e-300), 0, 1)
+        far = np.linalg.norm(away - share[:, None] * way, axis=1)
+        if far.max() > off:
+            middle = low + 1 + int(far.argmax())
+            kept[middle] = True
+            todo += [(low, middle), (middle, high)]
+    return line[kept]
 
 
 def _outline(line: Floats, radius: float) -> list[Floats]:

@@ -2,26 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.regions import cover, is_within, measure_length, resample, shift_border
+from damageest_paths.regions import cover, is_within, measure_length, resample
 
 FINE = 0.05
 """Distance, in bead widths, of the places of a line at which it is looked whether it may be there."""
 MORE = 0.05
 """Area, in squares of the bead's width, that a pass may cover outside of a region because it was lengthened."""
-NEAR = 0.9
-"""Share of half a bead's width within which a ring lies beside a gap."""
-JOIN = 1.0
-"""Bead widths round gaps by which what lies between them is bridged: a few long passes for many short ones."""
 APART = 1e-12
 """Product of areas below which two sides only touch."""
-LINK = 1.5
-"""Bead widths between the ends of two lines up to which they become one pass."""
 
 
 def trim_line(line: Floats, free: Any, width: float) -> list[Floats]:
@@ -55,12 +48,6 @@ def lengthen_line(line: Floats, shortest: float, region: Any, free: Any, width: 
     return longer if outside <= MORE * width**2 else line
 
 
-def follow_rim(rings: Sequence[Floats], gaps: Any, width: float) -> list[Floats]:
-    """The pieces of closed rings (K,2) whose beads lie beside gaps, a region."""
-    near = shift_border(shift_border(gaps, width / 2 * NEAR + JOIN * width), -JOIN * width)
-    return [piece for ring in rings for piece in cut_ring(ring, near, width)]
-
-
 def cut_ring(ring: Floats, region: Any, width: float) -> list[Floats]:
     """The pieces of a closed ring (K,2) that lie in a region; the whole ring, closed, where all of it does."""
     closed = np.concatenate([ring, ring[:1]])
@@ -69,52 +56,6 @@ def cut_ring(ring: Floats, region: Any, width: float) -> list[Floats]:
     if len(out):  # begins outside, so that no piece is cut in two
         closed = np.concatenate([points[out[0] : -1], points[: out[0] + 1]])
     return trim_line(closed, region, width)
-
-
-def join_lines(lines: Sequence[Floats], free: Any, width: float) -> list[Floats]:
-    """The polylines (K,2), joined end to end where the ends are not farther apart than ``LINK`` bead widths and the
-    straight way between them lies in the region ``free``. A closed one begins where it is nearest to an end of
-    another. The shortest ways are taken first; a joined line crosses itself nowhere."""
-    left = list(lines)
-    while len(left) > 1:
-        found = [
-            way for k in range(len(left)) for n in range(len(left)) if k != n for way in _list_links(left, k, n, width)
-        ]
-        for _, first, second, pair in sorted(found, key=lambda way: way[:3]):
-            start, stop = pair
-            link, _ = resample(np.array([start[-1], stop[0]]), FINE * width)
-            ends = np.array([start[-1], stop[0]])
-            if crosses(start, stop) or crosses(ends, start[:-1]) or crosses(ends, stop[1:]):
-                continue
-            if is_within(link[1:-1], free).all():
-                left = [line for k, line in enumerate(left) if k not in (first, second)]
-                left.append(np.concatenate([start, stop]))
-                break
-        else:
-            break
-    return left
-
-
-def _list_links(
-    lines: Sequence[Floats], first: int, second: int, width: float
-) -> list[tuple[float, int, int, tuple[Floats, Floats]]]:
-    """The ways from a line to an open one that are short enough: length, the two numbers, and both as they are run."""
-    one, other = lines[first], lines[second]
-    if is_closed(other) or (first > second and not is_closed(one)):
-        return []
-    found = []
-    for stop in (other, other[::-1]):
-        if is_closed(one):
-            nearest = int(np.argmin(np.linalg.norm(one[:-1] - stop[0], axis=1)))
-            turned = np.roll(one[:-1], -nearest, axis=0)
-            starts = [np.concatenate([turned, turned[:1]])]
-        else:
-            starts = [one, one[::-1]]
-        for start in starts:
-            far = float(np.linalg.norm(start[-1] - stop[0]))
-            if far <= LINK * width:
-                found.append((far, first, second, (start, stop)))
-    return found
 
 
 def crosses(line: Floats, other: Floats) -> bool:

@@ -56,7 +56,8 @@ def test_length_time_and_volume_are_those_of_the_moves() -> None:
     assert path.length == pytest.approx(steps[path.on[1:]].sum())
     assert path.minutes == pytest.approx(path.length / 600 + path.travel / 3000)
     assert path.bead_volume == pytest.approx(path.length * path.heights[0] * 0.7 * 2.0)
-    assert path.bead_volume > path.deposit_volume
+    # the flanks of a bead beside the border are not full
+    assert path.bead_volume > 0.9 * path.deposit_volume
 
 
 @pytest.mark.variants(1)
