@@ -16,8 +16,6 @@ from pathlib import Path
 from tests.test_collection import LIBRARY, NATIVE, OPTIONAL, list_users, run_pytest
 
 HEAD = "| blocked | lacks | collected | files that use it | passed | skipped | s |\n| --- | --- |" + " ---: |" * 5
-    "| blocked | lacks | collected | files that use it | passed | skipped | s |\n" + "| --- " * 2 + "| ---: " * 5 + "|"
-)
 BEGIN, END = "<!-- blocked: begin -->", "<!-- blocked: end -->"
 
 
