@@ -71,6 +71,7 @@ def cancel_after_segment(job: Path, folder: Path) -> float:
     with pytest.raises(CancelledError) as caught:
         damageest.run(job, progress=cancel_soon, cancel=cancel, output=folder, cache=False)
     assert caught.value.code == "cancelled"
+    assert "align" in {record.stage for record in caught.value.so_far.stages}
     return time.process_time() - at[0]
 
 

@@ -76,6 +76,7 @@ def test_lost_metal_cut_back_and_stock_are_three_numbers(small_result: Result) -
     cut = replace(small_result, sites=(replace(site, deposit=deposit, accepted=True),))
     assert cut.lost_volume == pytest.approx(small_result.damage_volume - 0.4 * body.volume)
     assert (cut.cut_back_volume, cut.stock_volume) == (pytest.approx(0.4 * body.volume), 7.0)
+    assert repr(cut).endswith(f"{cut.describe_volumes()}>")
     assert re.fullmatch(r"lost metal [0-9.]+ mm³, cut-back [0-9.]+ mm³, stock 7 mm³", cut.describe_volumes())
     opened = replace(small_result, sites=(replace(site, deposit=replace(deposit, milled=body), accepted=True),))
     assert opened.lost_volume == pytest.approx(small_result.damage_volume)

@@ -167,7 +167,9 @@ def call_with_cancel(signal: Signal | None, call: Callable[[], T]) -> T:
         watcher.end()  # again, where the interrupt came before the first one had begun
         if not signal.is_set():
             raise
-        raise CancelledError from error
+        cancelled = CancelledError()
+        cancelled.so_far = getattr(error, "so_far", None)
+        raise cancelled from error
 
 
 @contextmanager
@@ -175,8 +177,8 @@ def keep_so_far(engine: Engine) -> Iterator[None]:
     """Gives an error that ends a run what the run had computed before it, as ``so_far``."""
     try:
         yield
-    except DamageestError as error:
-        error.so_far = gather_so_far(engine)
+    except (DamageestError, KeyboardInterrupt) as error:
+        error.so_far = gather_so_far(engine)  # type: ignore[union-attr]
         raise
 
 

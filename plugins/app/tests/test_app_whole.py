@@ -66,6 +66,8 @@ def test_from_open_to_export(tmp_path: Path, pictures: Path) -> None:
             page.click("step-repair")
             page.click("repair-export")
             page.click("download")
+        page.click("step-judge")
+        page.wait("site", "proven")  # the app goes on
         with zipfile.ZipFile(waiting.value.path()) as archive:
             names = archive.namelist()
         assert {"block/result.json", "block/damage.stl", "block/path/site-1.ngc", "block/report.html"} <= set(names)
