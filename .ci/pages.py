@@ -5,7 +5,8 @@
 
 works in the folder where it is called: the README's first commands clone CHECKOUT there, and each page begins with
 what they left. Of each command it prints exit status, seconds and megabytes received, of each page those on disk, and
-it ends with 1 where one failed. With `--user`, called by root, `apt-get` alone is run as root, all else as the user N.
+it ends with a table of the pages (benchmarks/results/bare-machines.md), and with 1 where a command failed. With
+`--user`, called by root, `apt-get` alone is run as root, all else as the user N.
 
 Above a block, a page may say in a comment `<!-- not run: REASON -->`, or `<!-- file: PATH -->` where the reader saves
 it. A line that ends with `# exit status 1` is to end so.
@@ -70,6 +71,9 @@ class Reader:
     home: Path
     user: int
     failed: int = 0
+    seconds: float = 0
+    received: float = 0
+    typed: int = 0
 
     def begin(self, folder: Path) -> None:
         self.save(self.home / ".pages-folder", f"{folder}\n")
@@ -97,6 +101,7 @@ class Reader:
         begin, before = time.monotonic(), count_received()
         done = self.type_in(command)
         seconds, received = time.monotonic() - begin, (count_received() - before) / 1e6
+        self.seconds, self.received, self.typed = self.seconds + seconds, self.received + received, self.typed + 1
         print(f"{done.returncode:6d} {seconds:7.0f} s {received:7.1f} MB  {command}", flush=True)
         if done.returncode != wanted:
             self.failed += 1
@@ -131,12 +136,14 @@ def main() -> int:
     given = parser.parse_args()
     reader, root = Reader(Path.cwd(), given.user), given.checkout.resolve()
     clone = reader.home / "damageest"
+    rows = ["| page | commands | failed | s | MB received | MB on disk |", "| --- | ---: | ---: | ---: | ---: | ---: |"]
     for page in list_pages(root):
         blocks, is_start = read_blocks(page), page.name == START
         wanted = not given.only or page.name in given.only
         if not (wanted and any(not block.skipped and not block.file for block in blocks)) and not is_start:
             continue
         print(f"\n{page.relative_to(root)}", flush=True)
+        before, reader.seconds, reader.received, reader.typed = reader.failed, 0, 0, 0
         reader.begin(reader.home if is_start else clone)
         for line in () if is_start else list_resets(root):
             if (done := reader.type_in(line)).returncode:
@@ -149,7 +156,11 @@ def main() -> int:
             else:
                 for command in block.commands():
                     reader.run(re.sub(r"git clone (?=\S+ damageest)\S+", f"git clone -q {root}", command))
-        print(f"        {reader.count_disk()} MB on disk", flush=True)
+        disk, failed = reader.count_disk(), reader.failed
+        print(f"        {disk} MB on disk", flush=True)
+        took = f"{reader.seconds:.0f} | {reader.received:.0f} | {disk}"
+        rows.append(f"| {page.name} | {reader.typed} | {failed - before} | {took} |")
+    print("", *rows, sep="\n")
     print(f"\n{reader.failed} commands failed")
     return 1 if reader.failed else 0
 
