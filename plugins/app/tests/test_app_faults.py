@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -18,6 +19,8 @@ import trimesh
 from app_page import Page, mark, open_app, serve
 from app_shop import make_job, write_plate
 
+import damageest
+from tests import damaged_box
 from tests.stages.report.browser import open_browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
@@ -188,3 +191,23 @@ def test_without_the_token_nothing_is_answered(shop: Path) -> None:
                 urllib.request.urlopen(urllib.request.Request(address, headers={name: value}))
         with urllib.request.urlopen(address) as answer:
             assert answer.headers["X-Frame-Options"] == "DENY"
+
+
+def test_a_path_that_leaves_much_says_so_in_red_before_the_download(tmp_path: Path) -> None:
+    """A bead of 5 mm in a pit of 12 mm: a tenth of the deposit is not filled."""
+    nozzle = "{tip_radius: 2, length: 40, body_radius: 9}"
+    path = f"path: {{use: layers, height: 2, width: 5, feed: 600, standoff: 8, nozzle: {nozzle}}}\n"
+    job = damaged_box.write_small(tmp_path / "shop", path)
+    damageest.run(job, output=True)
+    with open_app(job.parent) as page:
+        page.wait("part-facts", "mm", 60)
+        page.at_rest()
+        page.click("step-repair")
+        page.click("repair-path")
+        page.wait("path-fault", "of the deposit is not filled")
+        page.click("repair-export")
+        page.wait("path-left", "of the deposit is not filled")
+        red = page.page.locator(mark("path-left")).evaluate("(one) => getComputedStyle(one).color")
+        r, g, b = (int(value) for value in re.findall(r"\d+", red)[:3])
+        assert r > 150 > max(g, b), red
+        assert page.page.locator(mark("download")).is_visible()
