@@ -118,7 +118,7 @@ def test_each_case_of_the_gallery_has_its_job_its_picture_and_what_was_found(reg
         assert kept[name]["total"] in GALLERY
 
 
-@pytest.mark.variants(slow=4)
+@pytest.mark.variants(slow=2)
 @pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_a_case_of_the_gallery_gives_what_the_page_says(case: str, tmp_path: Path) -> None:

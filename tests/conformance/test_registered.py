@@ -80,6 +80,17 @@ first."""
 ELSEWHERE = {"align register", "adapt auto", "enclose poisson_subtract", "part brep"}
 """Those of them that the default run leaves out here, since one run takes 2 s or more: each job runs the first,
 `adapt: smooth` is what the second runs, and the plugins have tests of their own of the others."""
+COMPARED = {
+    *(
+        "background bbox",
+        "background capsule",
+        "background cylinder",
+        "reconstruct ball_pivot",
+        "reconstruct pymeshlab",
+    ),
+    *("enclose octree", "enclose poisson_subtract", "enclose shortest_path", "enclose sweep"),
+}
+"""Those of `SLOW` that are there to compare others with: all their checks are made nightly, the brief ones slow."""
 BRIEF = ("test_declares_itself", "test_gives_its_type", "test_leaves_its_inputs", "test_fits_its_inputs")
 
 
@@ -92,7 +103,8 @@ def case(item: Any) -> Any:
     """The class that checks an implementation."""
     told = dict(WITH.get(f"{item.contract.stage} {item.name}", {}))
     if f"{item.contract.stage} {item.name}" in SLOW:
-        told["pytestmark"] = pytest.mark.slow
+        full = pytest.mark.nightly if f"{item.contract.stage} {item.name}" in COMPARED else pytest.mark.slow
+        told["pytestmark"] = full
     told["stage"] = item.cls(**told.pop("options", {}))
     return type(f"Test_{item.contract.stage}_{item.name}", (base(item.contract),), told)
 

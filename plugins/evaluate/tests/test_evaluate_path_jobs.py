@@ -41,6 +41,7 @@ def test_the_example_job_gives_code_that_follows_the_passes(tmp_path: Path) -> N
     assert np.ptp(np.nanmin(far, axis=0)) < 0.01
 
 
+@pytest.mark.variants(slow=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["wall", "ledge", "inner"])
 def test_five_axes_reach_tight_places(kind: str) -> None:

@@ -179,7 +179,7 @@ def test_a_job_writes_it_without_solids(small_done: Path, schema: etree.XMLSchem
     assert not [name for name in files if name.endswith(".stl")]
 
 
-@pytest.mark.variants(slow=3)
+@pytest.mark.variants(slow=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(path.stem for path in JOBS.glob("*.yaml")))
 def test_every_example_job_is_valid(tmp_path: Path, schema: etree.XMLSchema, name: str) -> None:

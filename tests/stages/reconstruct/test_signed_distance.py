@@ -67,6 +67,7 @@ CUT = {"tool": "box", "centre": [20, 15, 10], "size": [14, 12, 10], "rotation": 
 BLOB = {"tool": "blob", "centre": [18, 0, 10], "radius": 7, "seed": 2}
 
 
+@pytest.mark.variants(slow=2)
 @pytest.mark.slow
 @pytest.mark.parametrize(
     ("tool", "density", "points"),

@@ -321,7 +321,7 @@ def test_twelve_sites(chromium: Any, twelve: Path) -> None:
     check_drawn(report)
 
 
-@pytest.mark.variants(slow=3)
+@pytest.mark.variants(slow=1)
 @pytest.mark.slow
 @pytest.mark.parametrize("job", sorted((Path(__file__).parents[3] / "jobs").glob("*.yaml")), ids=lambda path: path.stem)
 def test_the_report_of_each_job(job: Path, chromium: Any, tmp_path: Path) -> None:
