@@ -148,6 +148,7 @@ def test_a_wrong_scale_is_named(registry: Registry) -> None:
     assert note.amount == pytest.approx(0.4, abs=0.05)
 
 
+@pytest.mark.slow
 def test_what_the_job_does_not_tell_is_named(plain: Halfway) -> None:
     assert len(plain.finish().not_in_budget) == 4
     assert plain.finish(**GIVEN).not_in_budget == ()

@@ -119,6 +119,7 @@ def test_a_path_is_laid_in_the_time_that_its_feeds_take(tmp_path: Path) -> None:
     assert nozzle.bounds == pytest.approx(np.array([[5, -5, 5.0], [15, 5, 25]]))
 
 
+@pytest.mark.slow
 def test_units_that_explain_the_sizes_are_offered(tmp_path: Path, registry: Registry) -> None:
     body = trimesh.creation.box((40, 30, 20))
     body.export(tmp_path / "box.stl")

@@ -15,6 +15,7 @@ DATA = Path(os.environ.get("DAMAGEEST_REAL_DATA", ""))
 DIE = PARTS[0]
 
 
+@pytest.mark.slow
 def test_the_crude_difference_is_that_of_a_worn_face() -> None:
     """A fifth of the top of a box is 0.5 lower; the scan stands in another place."""
     box = trimesh.creation.box((40, 30, 20)).subdivide_to_size(0.8)

@@ -47,6 +47,7 @@ def read_twice(tmp_path_factory: pytest.TempPathFactory) -> tuple[np.ndarray, Re
     return points, first, damageest.run(job, output=tmp_path / "out")
 
 
+@pytest.mark.slow
 def test_the_patches_of_a_folder_are_one_scan(read_twice: tuple[np.ndarray, Result, Result]) -> None:
     points, done, _ = read_twice
     assert done.scan.points == pytest.approx(points, abs=1e-5)
@@ -57,6 +58,7 @@ def test_the_patches_of_a_folder_are_one_scan(read_twice: tuple[np.ndarray, Resu
     assert "project.raw" in warning.text
 
 
+@pytest.mark.slow
 def test_a_folder_is_read_again_when_a_patch_changes(read_twice: tuple[np.ndarray, Result, Result]) -> None:
     _, first, again = read_twice
     assert len(first.scan.points) - len(again.scan.points) == 1500
