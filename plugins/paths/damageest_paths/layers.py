@@ -232,6 +232,7 @@ class Layers(Path):
         from damageest_paths.assemble import Speeds, describe_surplus, plan_moves
         from damageest_paths.directions import Planner, find_open_normal
         from damageest_paths.drafts import Draft, Task, draft_path
+        from damageest_paths.foot import reach_floor
         from damageest_paths.form_choice import plan_in_form
         from damageest_paths.laid import simulate_laid
         from damageest_paths.process import Cooling, Process
@@ -283,7 +284,8 @@ class Layers(Path):
             why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
         path = apply_table(plan_moves(draft, speeds), self.process, self.interpass, body, left)
-        return describe_surplus(simulate_laid(add_sizes(path, self.calibration), draft))
+        laid = simulate_laid(add_sizes(path, self.calibration), draft)
+        return describe_surplus(reach_floor(laid, draft))
 
     def _make_nozzle(self) -> Any:
         from damageest_paths import nozzle

@@ -18,10 +18,11 @@ CHORDS = 8
 """Directions across the layer's normal along which the metal is measured."""
 
 
-def cut_moves(path: DepositPath) -> tuple[DepositPath, Flags]:
-    """The path with moves that deposit cut so that none is longer than the bead is wide; and which (N,) of its points
-    are those of the path as it was."""
-    counts = np.where(path.on, np.maximum(np.ceil(path.moves / path.width - 1e-9), 1), 1).astype(int)
+def cut_moves(path: DepositPath, longest: float = 1.0) -> tuple[DepositPath, Flags]:
+    """The path with moves that deposit cut so that none is longer than ``longest`` bead widths; and which (N,) of its
+    points are those of the path as it was."""
+    most = longest * path.width
+    counts = np.where(path.on, np.maximum(np.ceil(path.moves / most - 1e-9), 1), 1).astype(int)
     rows = np.repeat(np.arange(len(counts)), counts)
     share = np.concatenate([np.arange(1, count + 1) / count for count in counts])[:, None]
     before = np.maximum(rows - 1, 0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.solids import to_arrays
 from damageest_paths.aims import DOWN, UP, Aims, cast_shadow, find_aims, find_sink, measure_margin
+from damageest_paths.anchor import find_foot
 from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
 from damageest_paths.fill import SLIVER, WITHIN, list_lines
@@ -36,6 +37,8 @@ UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "so thin over intact metal that a bead would lie in it",
     "no line of sight: something stands between nozzle and bead, or the tool would be too oblique",
 )
+ROOTED = 0.85
+"""Share of the first layer's height to which its beads may lie in intact metal at their sides."""
 OFF = 0.1
 """Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
 Z = np.array([0.0, 0.0, 1.0])
@@ -59,7 +62,8 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     meshes or the layers below are left out.
     """
     local, metal = frame.move(body), frame.move(around.metal)
-    low, high = local.bounding_box()[2], local.bounding_box()[5]
+    deepest, high = local.bounding_box()[2], local.bounding_box()[5]
+    low = find_foot(local, process.bead.width, process.height)
     count = max(1, int(np.ceil((high - low) / process.height - 1e-6)))
     height = (high - low) / count
     done = make_region([])
@@ -70,20 +74,23 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     width = process.bead.width
     # below, where the layer before was too thin over metal for a bead, metal is that much lower
     under = max(height / 4, height - find_sink(height, process))
+    # a bead on the floor fills a root that is narrower than it, and melts into its sides
+    rooted = process if process.sink is not None else replace(process, sink_share=ROOTED)
     # of a large part little lies near, and of that the less the higher the layer
     standoff = around.clearance.standoff
-    nearby = crop_metal(metal, local, 2 * height, measure_margin(standoff, process), standoff + height)
+    nearby = crop_metal(metal, local, 2 * height + low - deepest, measure_margin(standoff, process), standoff + height)
     above = local
     for number in range(count):
         floor, top = low + number * height, low + (number + 1) * height
         above, slab = above.split_by_plane(UP, top)
         wanted = cast_shadow(slab, process)
-        nearby = nearby.trim_by_plane(UP, floor - under)
+        foot = min(floor, deepest) if number == 0 else floor
+        nearby = nearby.trim_by_plane(UP, foot - under)
         beside = nearby.trim_by_plane(DOWN, -top)
         ground = cast_shadow(beside, process)
         firm = shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         held = wanted ^ firm
-        aims = find_aims(nearby, beside, wanted, (floor, top), standoff, process)
+        aims = find_aims(nearby, beside, wanted, (floor, top), standoff, process if number else rooted)
         free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
         angle = process.angle + number * process.turn
         drawn = held ^ aims.drawn
@@ -115,7 +122,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
             if rest.is_empty():
                 continue
             is_whole = (wanted - rest).is_empty()
-            piece = slab if is_whole else slab ^ rest.extrude(top - floor).translate((0, 0, floor))
+            piece = slab if is_whole else slab ^ rest.extrude(top - foot).translate((0, 0, foot))
             if piece.volume() > 0:
                 missing.append(piece)
                 reasons[why] = reasons.get(why, 0.0) + piece.volume()

@@ -115,7 +115,7 @@ def _measure_air(path: DepositPath, metal: Solid) -> tuple[Floats, Flags]:
     """The air (K,) under deposited points, in bead heights, and whether metal, not a bead, lies below each (K,)."""
     on = np.flatnonzero(path.on)
     chosen = on[:: max(1, len(on) // MOST)]
-    height = path.heights[path.part[chosen] - 1]
+    height = path.sizes[chosen, 1]
     to_metal = RayCaster(metal).find_first(path.points[chosen], -path.axes[chosen])[0]
     to_bead = np.array([_find_bead_below(path, on, k) for k in chosen])
     air = np.maximum(np.minimum(to_metal, to_bead) - height, 0) / height
