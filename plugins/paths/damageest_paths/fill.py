@@ -27,9 +27,9 @@ from damageest_paths.weave import Line, Pattern, Style, join_all, move_inside, w
 STYLE = Style()
 SLIVER = 0.04
 """Area of a gap, in squares of the bead's width, from which it gets a line."""
-NARROW = 0.1
+NARROW = 0.06
 """Bead widths up to which a gap is too narrow for a line: the melt closes it."""
-WORTH, SLIM = 0.12, 0.15
+WORTH, SLIM = 0.1, 0.08
 """Area in squares of the bead's width, and width in bead widths, that a pass has to cover which no other does."""
 BESIDE = 0.9
 """Share of half a bead's width within which a line that follows the border of the free region lies beside a gap."""

@@ -10,13 +10,11 @@ from scipy.spatial import KDTree
 from damageest.artefacts import DepositPath, Floats, Ints, Mesh, Solid
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.vectors import normalise
-from damageest_paths.beads import SHARE, Beads, simulate_beads
-from damageest_paths.drafts import Draft
 from damageest_paths.places import cut_moves, find_middles
 
-LEAST, MOST = 0.05, 0.6
+LEAST, MOST = 0.1, 0.6
 """Shares of a layer's height: air from which a bead is made higher, and by how much at most."""
-FINE = 0.05
+FINE = 0.1
 """The same: heights differ by steps of this."""
 LONGEST = 0.75
 """Bead widths that a move is long at most: beads lie on beads of which a place is near."""
@@ -71,27 +69,14 @@ def _find_beads_below(path: DepositPath, own: Ints) -> Floats:
     return found
 
 
-def reach_floor(path: DepositPath, draft: Draft) -> DepositPath:
-    """The path with beads that are higher, and slower, where there is air under them: their foot lies on the metal.
-
-    Where trials say how high beads are, nothing is changed. The fill is that of the beads with these heights.
-    """
-    if path.bead_sizes is not None or not path.on.any():
+def raise_beads(path: DepositPath, left: Solid | None) -> DepositPath:
+    """The path with beads that are higher where there is air under them, so that their foot lies on the metal."""
+    if not path.on.any():
         return path
     cut, _ = cut_moves(path, LONGEST)
-    height = cut.planned_sizes[:, 1]
-    more = np.round(np.minimum(measure_air(cut, draft.task.left) / height, MOST) / FINE) * FINE
-    more[more < LEAST - 1e-9] = 0.0
-    if not more.any():
-        return cut
     sizes = cut.planned_sizes
+    more = np.round(np.minimum(measure_air(cut, left) / sizes[:, 1], MOST) / FINE) * FINE
+    if not (more >= LEAST - 1e-9).any():
+        return cut
     sizes[:, 1] *= 1 + more
-    found = replace(cut, bead_sizes=sizes, feed=cut.feed / (1 + more))
-    if draft.fill is None:
-        return found
-    own = np.flatnonzero(found.on)
-    laid = sizes[own]
-    beads = Beads(found.points[own - 1], found.points[own], found.normals[own], *laid.T)
-    edge = min(path.width, float(path.heights.min())) / SHARE
-    fill = simulate_beads(beads, draft.task.body, draft.missing, draft.task.left, draft.plans[0].frame, edge)
-    return replace(found, fill=fill)
+    return replace(cut, bead_sizes=sizes)

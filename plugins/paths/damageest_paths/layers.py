@@ -22,9 +22,9 @@ Angle = Annotated[float, Field(allow_inf_nan=False)]
 
 
 class StartPlace(Options):
-    """A place in part coordinates."""
+    """Near to which rings begin."""
 
-    at: Vector = Field(description="[x, y, z] near to which rings and spirals begin")
+    at: Vector = Field(description="[x, y, z] in part coordinates")
 
 
 def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto", "normal"] | Vector:
@@ -127,8 +127,7 @@ class Layers(Path):
     turn: float = Field(90.0, allow_inf_nan=False, description="of the rows from layer to layer, in degrees")
     starts: Literal["spread", "aligned"] | StartPlace = Field(
         "spread",
-        description="where rings and spirals begin: spread: in another direction from layer to layer; aligned: in the "
-        "same; {at: [x, y, z]}: near to that place",
+        description="where rings begin: spread: in another direction from layer to layer; aligned; {at: [x, y, z]}",
     )
     overhang: float = Field(
         45.0, ge=0, lt=90, description="largest angle between build direction and an overhanging side, in degrees"
@@ -232,7 +231,7 @@ class Layers(Path):
         from damageest_paths.assemble import Speeds, describe_surplus, plan_moves
         from damageest_paths.directions import Planner, find_open_normal
         from damageest_paths.drafts import Draft, Task, draft_path
-        from damageest_paths.foot import reach_floor
+        from damageest_paths.foot import raise_beads
         from damageest_paths.form_choice import plan_in_form
         from damageest_paths.laid import simulate_laid
         from damageest_paths.process import Cooling, Process
@@ -283,9 +282,11 @@ class Layers(Path):
         if self.layers == "conformal" and draft.is_empty:
             why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")
-        path = apply_table(plan_moves(draft, speeds), self.process, self.interpass, body, left)
-        laid = simulate_laid(add_sizes(path, self.calibration), draft)
-        return describe_surplus(reach_floor(laid, draft))
+        moves = plan_moves(draft, speeds)
+        if not self.calibration:
+            return describe_surplus(apply_table(raise_beads(moves, left), self.process, self.interpass, body, left))
+        path = add_sizes(apply_table(moves, self.process, self.interpass, body, left), self.calibration)
+        return describe_surplus(simulate_laid(path, draft))
 
     def _make_nozzle(self) -> Any:
         from damageest_paths import nozzle

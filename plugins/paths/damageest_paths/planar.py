@@ -37,8 +37,9 @@ UNSUPPORTED, COLLIDES, SHORT, SUNK, SHADED = (
     "so thin over intact metal that a bead would lie in it",
     "no line of sight: something stands between nozzle and bead, or the tool would be too oblique",
 )
-ROOTED = 0.85
-"""Share of the first layer's height to which its beads may lie in intact metal at their sides."""
+ROOTED, ROOM = 1.9, 0.48
+"""How many times as deep beads of the first layer may lie in intact metal at their sides, where else there is no
+room of this many bead widths to both sides."""
 OFF = 0.1
 """Bead widths by which the middle of a bead may lie beside what a layer has to fill."""
 Z = np.array([0.0, 0.0, 1.0])
@@ -74,8 +75,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     width = process.bead.width
     # below, where the layer before was too thin over metal for a bead, metal is that much lower
     under = max(height / 4, height - find_sink(height, process))
-    # a bead on the floor fills a root that is narrower than it, and melts into its sides
-    rooted = process if process.sink is not None else replace(process, sink_share=ROOTED)
+    rooted = process if process.sink is not None else replace(process, sink_share=ROOTED * process.sink_share)
     # of a large part little lies near, and of that the less the higher the layer
     standoff = around.clearance.standoff
     nearby = crop_metal(metal, local, 2 * height + low - deepest, measure_margin(standoff, process), standoff + height)
@@ -90,7 +90,10 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         ground = cast_shadow(beside, process)
         firm = shift_border(unite_regions([ground, done]), height * np.tan(process.overhang))
         held = wanted ^ firm
-        aims = find_aims(nearby, beside, wanted, (floor, top), standoff, process if number else rooted)
+        aims = find_aims(nearby, beside, wanted, (floor, top), standoff, process)
+        if number == 0 and shift_border(held ^ aims.drawn, -ROOM * width).is_empty():
+            # a bead on the floor fills a root that is narrower than it, and melts into its sides
+            aims = find_aims(nearby, beside, wanted, (floor, top), standoff, rooted)
         free = None if aims.free is None else aims.free ^ shift_border(held, OFF * width)
         angle = process.angle + number * process.turn
         drawn = held ^ aims.drawn

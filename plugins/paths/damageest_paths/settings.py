@@ -69,7 +69,9 @@ def apply_table(
     is_local = any(row.is_local for row in table)
     found, is_end = cut_moves(path) if is_local or wait else (path, np.ones(len(path.points), bool))
     places = Places(found, body, left)
-    found = replace(found, feed=_set_speeds(places, [row for row in table if row.rest is None]))
+    feed = _set_speeds(places, [row for row in table if row.rest is None])
+    # a bead that is higher is as much slower
+    found = replace(found, feed=feed * found.planned_sizes[:, 1] / found.sizes[:, 1])
     found = add_waits(found, wait)
     names = list(dict.fromkeys(name for row in table for name in row.set if name != SPEED))
     if names:
@@ -156,10 +158,12 @@ def _merge(path: DepositPath, is_end: Flags) -> DepositPath:
     same = path.feed[:-1] == path.feed[1:]
     if path.values is not None:
         same &= (path.values[:-1] == path.values[1:]).all(axis=1)
+    if path.bead_sizes is not None:
+        same &= (path.bead_sizes[:-1] == path.bead_sizes[1:]).all(axis=1)
     kept = is_end.copy()
     kept[:-1] |= ~same
     if kept.all():
         return path
-    columns = ("points", "axes", "normals", "feed", "on", "layer", "number", "part", "values", "dwell")
+    columns = ("points", "axes", "normals", "feed", "on", "layer", "number", "part", "values", "dwell", "bead_sizes")
     own = {name: getattr(path, name) for name in columns}
     return replace(path, **{name: value[kept] for name, value in own.items() if value is not None})

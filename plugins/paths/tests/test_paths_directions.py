@@ -17,8 +17,8 @@ from path_cavities import pocket, prepare, stair
 
 from tests.path_shapes import BLOCK, Loss, cut
 
-SMALL = cut(BLOCK, Manifold.cube((10, 8, 9)).translate((-5, -4, -3)))
-"""A pocket 3 deep."""
+SMALL = cut(BLOCK, Manifold.cube((10, 8, 12)).translate((-5, -4, -6)))
+"""A pocket 6 deep."""
 
 
 @pytest.mark.parametrize("loss", [SMALL, *(pytest.param(loss, marks=pytest.mark.slow) for loss in (pocket(), stair()))])

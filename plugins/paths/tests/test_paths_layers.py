@@ -54,8 +54,11 @@ def test_length_time_and_volume_are_those_of_the_moves() -> None:
     path = plan_dent()
     steps = np.linalg.norm(np.diff(path.points, axis=0), axis=1)
     assert path.length == pytest.approx(steps[path.on[1:]].sum())
-    assert path.minutes == pytest.approx(path.length / 600 + path.travel / 3000)
-    assert path.bead_volume == pytest.approx(path.length * path.heights[0] * 0.7 * 2.0)
+    laying = path.on[1:]
+    assert path.minutes == pytest.approx((steps[laying] / path.feed[1:][laying]).sum() + path.travel / 3000)
+    slower = path.planned_sizes[path.on, 1] / path.sizes[path.on, 1]
+    assert path.feed[path.on] == pytest.approx(600 * slower)
+    assert path.bead_volume == pytest.approx((steps[laying] / slower).sum() * path.heights[0] * 0.7 * 2.0)
     # the flanks of a bead beside the border are not full
     assert path.bead_volume > 0.9 * path.deposit_volume
 

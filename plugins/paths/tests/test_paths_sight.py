@@ -143,7 +143,7 @@ def test_a_strip_too_narrow_beside_a_wall_is_listed(rise: float) -> None:
     wall += Manifold.cube((30, 40, 10)).translate((0, -20, -10))
     path = plan(cut(wall + lost, lost), direction=(0.0, 0.0, 1.0), axes=3)
     assert path.fill is not None
-    assert path.fill.filled > 0.995
+    assert path.fill.filled > 0.985
     narrow = 0.7 * (24 - 10) * 3
     thin = [each.volume for each in path.unreached if "so thin over intact metal" in each.why]
     assert 0.75 * narrow < sum(thin) < 2 * narrow
