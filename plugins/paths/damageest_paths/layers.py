@@ -98,7 +98,7 @@ class Layers(Path):
         "loses at most half of that, else planar",
     )
     width: Length = Field(description="of a bead; optional with calibration, like height")
-    feed: Length = Field(description="speed of deposition, in lengths a minute")
+    feed: Length = Field(description="speed of deposition, in lengths a minute; where a bead is higher, it is less")
     nozzle: Nozzle = Field(
         description="{tip_radius, cone_angle, length, body_radius}: a flat tip, a cone of this angle (degrees) between "
         "axis and side, a cylinder; or {mesh: path}, tip at 0, axis along z"
@@ -204,10 +204,8 @@ class Layers(Path):
     @model_validator(mode="after")
     def _check_standoff(self) -> Layers:
         if self.standoff is not None and self.standoff < self._gap:
-            raise ValueError(
-                f"standoff ({self.standoff:g}) is smaller than clearance ({self._gap:g}): the tip would be too near to "
-                "the bead that it lays"
-            )
+            words = f"standoff ({self.standoff:g}) is smaller than clearance ({self._gap:g})"
+            raise ValueError(f"{words}: the tip would be too near to the bead that it lays")
         return self
 
     @property
