@@ -57,6 +57,20 @@ def test_a_feature_tells_the_angle_where_it_was_seen(seed: int, seen: bool) -> N
     assert (gap < 10 * draw.tolerance) == seen
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_datums_lie_on_the_scan_as_it_is(seed: int) -> None:
+    """Worn all over, datum A still is where the part lies; worn in part, the rest of it is."""
+    draw = FAMILIES["datums"][1](seed)
+    assert draw.pose is not None
+    assert draw.damage is not None
+    placed = move_points(draw.scan.points, draw.pose)
+    bottom = placed[np.abs(placed[:, 2]) < draw.tolerance, 2]
+    assert len(bottom) > 2000
+    assert bottom.mean() == pytest.approx(0, abs=draw.tolerance / 10)
+    if draw.said["state"] in ("others worn", "datum worn"):
+        assert placed[:, 2].max() < draw.part.bounds[1, 2] - draw.tolerance
+
+
 def test_equal_seeds_give_equal_scans() -> None:
     first, second = FAMILIES["hands"][1](3), FAMILIES["hands"][1](3)
     assert np.array_equal(first.scan.points, second.scan.points)
@@ -65,8 +79,8 @@ def test_equal_seeds_give_equal_scans() -> None:
 
 def test_cases_are_drawn_evenly_and_counted_by_group() -> None:
     cases = make_family_cases((), 10, (), "source")
-    assert len(cases) == 42
-    assert len({case.compute_key() for case in cases}) == 42
+    assert len(cases) == 46
+    assert len({case.compute_key() for case in cases}) == 46
     rows = [case.make_blank_row() | {"said": {"side": "both"}} for case in cases if case.family == "walls"]
     rows[0] |= {"outcome": "right", "comes_out": True, "holds": True, "accepted": 1, "sites": 1}
     table = make_family_table(rows)

@@ -11,7 +11,7 @@ from damageest_evaluate.commands._counted import AsJson
 
 
 def command(
-    families: Annotated[list[str] | None, typer.Argument(help="walls, hands, turned. Default: all.")] = None,
+    families: Annotated[list[str] | None, typer.Argument(help="walls, hands, turned, datums. Default: all.")] = None,
     every: Annotated[int, typer.Option(min=1, help="Take one draw of so many.")] = 1,
     seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds of the draws, instead of --every.")] = "",
     workers: Annotated[int, typer.Option(min=1, help="Draws that run at the same time.")] = 1,
@@ -22,10 +22,11 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count which draws of a family come out: walls (300), hands (60), turned (60).
+    """Count which draws of a family come out: walls (300), hands (60), turned (60),
+    datums (40).
 
     walls: a pit in a wall of 0.6 to 8 mm, scanned from outside, inside or both. hands: the part or its mirror image.
-    turned: round parts whose angle one small feature tells.
+    turned: round parts whose angle one small feature tells. datums: parts held by datums that are sound or worn.
     """
     from damageest.errors import InputError
     from damageest.registry import Registry

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from damageest.errors import InputError, StageError
 from damageest.result import Result
+from damageest_evaluate.families.datums import draw_datums
 from damageest_evaluate.families.hands import draw_hand
 from damageest_evaluate.families.scene import Draw
 from damageest_evaluate.families.turned import draw_turned
@@ -20,7 +21,7 @@ from damageest_evaluate.troubles.case import describe_judgement
 from damageest_evaluate.troubles.classify import TrueState, judge, judge_error
 
 FAMILIES: Mapping[str, tuple[int, Callable[[int], Draw]]] = {
-    "walls": (300, draw_wall), "hands": (60, draw_hand), "turned": (60, draw_turned),
+    "walls": (300, draw_wall), "hands": (60, draw_hand), "turned": (60, draw_turned), "datums": (40, draw_datums),
 }  # fmt: skip
 """How many draws each family has, and what makes one from its seed."""
 NARROW = 0.25

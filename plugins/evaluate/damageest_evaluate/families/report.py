@@ -12,6 +12,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "walls": ("side", "body", "pit"),
     "hands": ("hand", "body"),
     "turned": ("body", "feature"),
+    "datums": ("state", "form"),
 }
 """What the draws of a family are grouped by."""
 
