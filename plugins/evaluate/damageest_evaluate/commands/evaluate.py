@@ -256,6 +256,7 @@ def matrix_command(
     write: Annotated[
         Path | None, typer.Option(help="Text file. Its lines between the matrix marks are replaced by the table.")
     ] = None,
+    marks: Annotated[str, typer.Option(help="Name in the marks of --write.")] = "matrix",
     as_json: AsJson = False,
 ) -> None:
     """Measure IoU, time and memory of every implementation of every stage, with the other stages at default."""
@@ -263,13 +264,11 @@ def matrix_command(
     from damageest_evaluate.matrix import run_matrix
     from damageest_evaluate.readme import make_matrix_table, replace_between_marks
 
-    prepare_places(None, write, "matrix")
+    prepare_places(None, write, marks)
     cells = run_matrix(jobs, Registry.discover(), stage or (), workers, timeout, _print_cell)
     show_table(make_matrix_table(cells), list(map(asdict, cells)), as_json)
     if write:
-        write.write_text(
-            replace_between_marks(write, make_matrix_table(cells, legend=False), "matrix"), encoding="utf-8"
-        )
+        write.write_text(replace_between_marks(write, make_matrix_table(cells, legend=False), marks), encoding="utf-8")
 
 
 def _print_cell(cell: MatrixCell) -> None:
