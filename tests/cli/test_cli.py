@@ -11,7 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 from damageest.cli import app
-from damageest.findings import describe_volume
+from damageest.findings import describe_volume, write_digits
 from damageest.registry.contracts import STAGES
 from tests import damaged_box
 from tests.cli.calls import call as call_here
@@ -60,7 +60,7 @@ def test_the_table_says_what_to_deposit_and_what_to_mill_off(command_run: Ran) -
     report = json.loads((command_run.folder / "out/job/result.json").read_text())["sites"][0]
     assert site[1] == describe_volume(report["volume"], report["volume_95"])
     assert float(site[1]) == pytest.approx(report["volume"], rel=0.001)
-    assert site[4:6] == [f"{report['deposit'][name]:.4g}" for name in ("volume", "stock_volume")]
+    assert site[4:6] == [write_digits(report["deposit"][name], 4) for name in ("volume", "stock_volume")]
 
 
 def test_json_is_the_result_and_fits_its_schema(tmp_path: Path) -> None:

@@ -74,8 +74,9 @@ def test_the_check_sees_a_pass_that_crosses_itself() -> None:
     _, path = plan_dent()
     assert count_crossings(path) == 0
     points = path.points.copy()
-    own = np.flatnonzero(path.on & (path.number == path.passes))
-    points[own[3]] = points[own[0] - 1] - [1, 1, 0]
+    own = np.flatnonzero(path.on & (path.number == np.argmax(np.bincount(path.number[path.on]))))
+    middle = (points[own[0] - 1] + points[own[0]]) / 2
+    points[own[-1]] = 2 * middle - points[own[-1] - 1]  # the last move passes through the middle of the first
     assert count_crossings(replace(path, points=points)) > 0
 
 

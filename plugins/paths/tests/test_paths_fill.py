@@ -38,7 +38,7 @@ REGIONS = {
 
 
 @pytest.mark.parametrize("pattern", get_args(Pattern))
-@pytest.mark.parametrize("name", REGIONS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "star" else n for n in REGIONS])
 def test_beads_cover_the_region_and_little_else(name: str, pattern: Pattern) -> None:
     region = REGIONS[name]
     lines = fill_region(region, pattern, BEAD, 0.4)
@@ -64,13 +64,13 @@ def count_crossings(line: Floats, other: Floats) -> int:
 
 
 @pytest.mark.parametrize("pattern", get_args(Pattern))
-@pytest.mark.parametrize("name", REGIONS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "star" else n for n in REGIONS])
 def test_no_pass_crosses_itself(name: str, pattern: Pattern) -> None:
     for line in fill_region(REGIONS[name], pattern, BEAD, 0.4):
         assert count_crossings(line, line) == 0
 
 
-@pytest.mark.parametrize("name", REGIONS)
+@pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow) if n == "star" else n for n in REGIONS])
 def test_rows_of_a_zigzag_cross_no_other(name: str) -> None:
     lines = fill_region(REGIONS[name], "zigzag", BEAD, 0.4)
     assert sum(count_crossings(a, b) for a, b in combinations(lines, 2)) == 0

@@ -106,6 +106,7 @@ def test_the_metal_is_as_wide_as_the_wall() -> None:
     assert measure_widths(wide, loss.lost, loss.left)[wide.on].min() > 20
 
 
+@pytest.mark.slow
 def test_the_time_since_the_neighbour_is_that_of_all_pairs() -> None:
     path, _ = cut_moves(plan_rings())
     some = path.number <= 6

@@ -92,7 +92,9 @@ def test_the_apt_gives_the_points_of_the_csv(tilted: bool, tmp_path: Path) -> No
     assert np.abs(np.delete(found - table[:, :8], 6, axis=1)).max() < 1e-6
     assert np.abs((found - table[:, :8])[1:]).max() < 1e-6
     assert (table[:, 11] == path.width).all()
-    assert np.allclose(table[:, 12], path.heights[path.part - 1], rtol=1e-5)
+    sizes = path.bead_sizes
+    heights = path.heights[path.part - 1] if sizes is None else sizes[:, 1]
+    assert np.allclose(table[:, 12], heights, rtol=1e-5)
     assert np.abs(table[:, :3] - path.points).max() < 1e-6
     assert text.startswith("PARTNO BLOCK SITE 1\nUNITS/MM\n")
     assert "LOADTL/1" in text
