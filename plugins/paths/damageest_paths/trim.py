@@ -60,13 +60,22 @@ def cut_ring(ring: Floats, region: Any, width: float) -> list[Floats]:
 
 def crosses(line: Floats, other: Floats) -> bool:
     """Whether a side of one polyline (K,2) properly crosses a side of another (M,2)."""
-    a, b, c, d = line[:-1, None], line[1:, None], other[None, :-1], other[None, 1:]
+    first, second = _keep_near(line, other), _keep_near(other, line)
+    a, b = first[:, None, 0], first[:, None, 1]
+    c, d = second[None, :, 0], second[None, :, 1]
 
     def side(p: Floats, q: Floats, r: Floats) -> Floats:
         return np.asarray((q - p)[..., 0] * (r - p)[..., 1] - (q - p)[..., 1] * (r - p)[..., 0])
 
     across = (side(a, b, c) * side(a, b, d) < -APART) & (side(c, d, a) * side(c, d, b) < -APART)
     return bool(across.any())
+
+
+def _keep_near(line: Floats, other: Floats) -> Floats:
+    """(S,2,2) the sides of a polyline (K,2) whose boxes reach into the box of another."""
+    sides = np.stack([line[:-1], line[1:]], axis=1)
+    near = (sides.min(axis=1) <= other.max(axis=0)) & (sides.max(axis=1) >= other.min(axis=0))
+    return np.asarray(sides[near.all(axis=1)])
 
 
 def is_closed(line: Floats) -> bool:
