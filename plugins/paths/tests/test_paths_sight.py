@@ -59,7 +59,7 @@ def measure_beam(path: DepositPath, metal: Solid) -> float:
 
 
 @pytest.mark.variants(1)
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", sorted(CASES, reverse=True))
 def test_no_metal_is_in_the_beam(name: str) -> None:
     loss, path = make_case(name)
     assert path.on.any()
