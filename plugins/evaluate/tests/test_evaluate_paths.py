@@ -51,7 +51,8 @@ def test_the_check_sees_beads_and_beam_in_metal() -> None:
     assert measure_shaded(path, loss.left, path.width / 4) == 0
     assert measure_sunk(path, loss.left, path.width / 4) <= 0.05 * loss.lost.volume
     lower = replace(path, points=path.points - [0, 0, 6.0])  # the dent is 4 deep
-    assert measure_sunk(lower, loss.left, path.width / 4) == pytest.approx(lower.bead_volume, rel=0.02)
+    # of beads of the layer's height: those over air are higher
+    assert 0.9 * lower.bead_volume < measure_sunk(lower, loss.left, path.width / 4) <= 1.02 * lower.bead_volume
     assert measure_shaded(lower, loss.left, path.width / 4) > 0.9
     aside = np.array([0.96, 0.0, 0.28])  # the beam through the wall of the dent, the beads where they were
     tilted = replace(path, axes=np.tile(aside, (len(path.axes), 1)))

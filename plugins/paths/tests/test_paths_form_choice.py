@@ -35,14 +35,14 @@ def joined(monkeypatch: pytest.MonkeyPatch) -> list[int]:
     return found
 
 
-def plan_all(loss: Loss) -> dict[str, DepositPath]:
-    return {form: plan(loss, direction=UP, axes=5, layers=form) for form in ("auto", "planar")}
+def plan_all(loss: Loss, height: float = 1.0) -> dict[str, DepositPath]:
+    return {form: plan(loss, direction=UP, axes=5, layers=form, height=height) for form in ("auto", "planar")}
 
 
 @pytest.mark.slow
 def test_where_planes_lose_much_layers_follow_the_floor(joined: list[int]) -> None:
     loss = dent()
-    paths = plan_all(loss)
+    paths = plan_all(loss, 1.3)
     assert len(joined) == len(paths), "moves are planned for the form that is taken alone"
     assert measure_lost(paths["planar"]) > POOR
     assert paths["auto"].layer_form == "conformal"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from functools import cache
 from typing import Any
 
+import numpy as np
 import pytest
 
 from damageest.artefacts import BeadFill, DepositPath
@@ -29,12 +30,19 @@ def get_fill(path: DepositPath) -> BeadFill:
     return path.fill
 
 
+def measure_level(path: DepositPath) -> float:
+    """The volume of the beads, were none over air higher than its layer."""
+    assert path.bead_sizes is not None
+    long = np.linalg.norm(np.diff(path.points, axis=0, prepend=path.points[:1]), axis=1) * path.on
+    return float(path.bead_volume * (long @ path.heights[path.part - 1]) / (long @ path.bead_sizes[:, 1]))
+
+
 @pytest.mark.slow
 def test_beads_as_planned_fill_what_is_planned() -> None:
     plain, laid = plan_dent(), plan_dent(600.0)
     # layers are made equal, so that they are a little lower than 1
     assert get_fill(laid).filled == pytest.approx(get_fill(plain).filled, abs=0.01)
-    assert laid.bead_volume == pytest.approx(plain.bead_volume / plain.heights[0], rel=1e-6)
+    assert laid.bead_volume == pytest.approx(measure_level(plain) / plain.heights[0], rel=1e-6)
 
 
 @pytest.mark.slow
@@ -42,8 +50,8 @@ def test_small_beads_leave_gaps() -> None:
     plain, laid = plan_dent(), plan_dent(1200.0)
     assert get_fill(plain).filled > 0.99
     # rows are 1.4 apart and layers 1 high, or little less
-    assert get_fill(laid).of_deposit == pytest.approx(1.2 * 0.6 / (1.4 * plain.heights[0]), abs=0.06)
-    assert laid.bead_volume == pytest.approx(plain.bead_volume * 0.36 / plain.heights[0], rel=1e-6)
+    assert get_fill(laid).of_deposit == pytest.approx(1.2 * 0.6 / (1.4 * plain.heights[0]), abs=0.08)
+    assert laid.bead_volume == pytest.approx(measure_level(plain) * 0.36 / plain.heights[0], rel=1e-6)
     assert laid.surplus_volume == 0
 
 

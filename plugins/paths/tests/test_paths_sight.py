@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 from damageest.artefacts import DepositPath, Floats, Solid
 from damageest.geometry.distance import signed_distance, winding_number
-from tests.path_shapes import BLOCK, OPTIONS, Loss, corner, cut, dent, plan
+from tests.path_shapes import BLOCK, OPTIONS, Loss, cut, dent, plan
 
 UP = (0.0, 0.0, 1.0)
 CASES: dict[str, dict[str, Any]] = {
@@ -149,13 +149,6 @@ def test_a_strip_too_narrow_beside_a_wall_is_listed(rise: float) -> None:
     assert 0.75 * narrow < sum(thin) < 2 * narrow
     listed = path.unreached_volume / path.deposit_volume
     assert path.fill.of_deposit + listed + path.fill.gap / path.deposit_volume == pytest.approx(1, abs=0.02)
-
-
-@pytest.mark.slow
-def test_over_build_is_said() -> None:
-    path = plan(corner(), direction=(0.6, 0.48, 0.64))
-    assert path.surplus_volume > 0.1 * path.deposit_volume
-    assert any("milled off" in note for note in path.notes)
 
 
 def test_few_passes_and_little_travel() -> None:
