@@ -193,7 +193,7 @@ class Result:
 
     def __repr__(self) -> str:
         levels = ", ".join(f"{site.id} {site.verdict.level}" for site in self.sites) or "none"
-        told = "; ".join(("", more)) if (more := self.describe_volumes()) else ""
+        told = f"; {more}" if (more := self.describe_volumes()) else ""
         return f"<Result {self.name}: sites: {levels}; damage volume {self.damage_volume:.6g} {self.units}³{told}>"
 
     @property

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Mesh, Part, Surface
+from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Surface
 from damageest.errors import StageError
 from damageest.geometry.bodies import label_pieces
 from damageest.geometry.distance import closest_on_mesh
@@ -54,10 +54,11 @@ def divide_part(part: Part, sheet: Sheet, intact: Floats, side: str, tolerance: 
     loose = np.ones(len(sheet.mesh.faces), bool)
     loose[: len(sheet.own.faces)] = _find_folds(sheet.own)
     body -= _thicken_each(sheet.mesh.triangles[loose] - origin, 2 * THIN * tolerance)
+    piece = label_pieces(sheet.own.faces)
     for wide in OPENED if len(sheet.places) else OPENED[:1]:
         bodies = (body - _make_balls(sheet.places - origin, wide * sheet.deep)).decompose()
         meshes = [Mesh(*to_arrays(one, origin)) for one in bodies]
-        area = _align_sides(np.array([_measure_sides(mesh, sheet, tolerance) for mesh in meshes]))
+        area = _align_sides(np.array([_measure_sides(mesh, sheet, piece, tolerance) for mesh in meshes]))
         if area.min(axis=1).max(initial=0.0) < MOST_BOTH * sheet.mesh.area:  # a pocket in a fold has both sides
             break
     else:
@@ -112,15 +113,14 @@ def _make_balls(places: Floats, radius: Floats) -> Any:
     return Manifold.batch_boolean(balls or [Manifold()], OpType.Add)
 
 
-def _measure_sides(mesh: Mesh, sheet: Sheet, tolerance: float) -> Floats:
+def _measure_sides(mesh: Mesh, sheet: Sheet, piece: Ints, tolerance: float) -> Floats:
     """(P,2) the area of a body's faces on the front and on the back of each piece of the damage surface, without what
-    extends it."""
+    extends it. ``piece``: the number of the piece of each face of the surface."""
     distance, face, _ = closest_on_mesh(mesh.triangles.mean(axis=1), sheet.mesh)
     at = np.flatnonzero((distance < 3 * THIN * tolerance) & (face < len(sheet.own.faces)))
     own, other = mesh.cross[at], sheet.mesh.cross[face[at]]
     size = np.linalg.norm(own, axis=1)
     lean = np.einsum("ij,ij->i", own, other) / np.maximum(size * np.linalg.norm(other, axis=1), 1e-300)
-    piece = label_pieces(sheet.own.faces)
     label, count = piece[face[at]], int(piece.max()) + 1
     sides = [np.bincount(label, np.where(which, size / 2, 0), count) for which in (lean < -0.9, lean > 0.9)]
     return np.stack(sides, axis=1)

@@ -6,7 +6,6 @@ process of its own, so that its peak memory can be measured.
 
 from __future__ import annotations
 
-import os
 import shutil
 import tempfile
 from collections.abc import Callable, Sequence
@@ -18,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from damageest.errors import DamageestError, Fault, JobError
+from damageest.isolation import cpu_seconds
 from damageest.registry import Implementation, Registry
 from damageest.registry.contracts import STAGES
 from damageest_evaluate.matrix_job import MatrixJob, load_scene, make_settings, prepare_matrix_job
@@ -99,7 +99,7 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     part, scan, lost, pose = load_scene(folder, np.array(case["moved"]))
     own = Path(tempfile.mkdtemp(dir=folder))
     shutil.copytree(folder / "early", own, dirs_exist_ok=True)
-    start = _measure_processor_seconds()
+    start = cpu_seconds()
     row: dict[str, Any] = {"iou": float("nan")}
     given: dict[str, Any] = {} if case["own_part"] else {"part": part}
     given |= {} if case["own_scan"] else {"scan": scan}
@@ -108,10 +108,10 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
         result = damageest.run(case["job"], output=own, settings=settings, **given)
     except DamageestError as error:
         row["refused"] = _shorten_reason(str(error))
-        return row | {"seconds": _measure_processor_seconds() - start}
+        return row | {"seconds": cpu_seconds() - start}
     finally:
         shutil.rmtree(own)
-    row["seconds"] = _measure_processor_seconds() - start
+    row["seconds"] = cpu_seconds() - start
     row["stage_seconds"] = sum(record.seconds for record in result.stages if record.stage == case["stage"])
     row["megabytes"] = memory.take_peak()
     solids = [site.damage for site in result.sites]
@@ -121,11 +121,6 @@ def _run_measured(case: dict[str, Any], memory: PeakMemory) -> dict[str, Any]:
     if result.failures:
         row["refused"] = _shorten_reason(result.failures[0])
     return row
-
-
-def _measure_processor_seconds() -> float:
-    """Of this process and of those it started that have ended."""
-    return sum(os.times()[:4])
 
 
 def _shorten_reason(text: str) -> str:

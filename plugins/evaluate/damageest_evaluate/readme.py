@@ -77,7 +77,7 @@ def _list_off(cells: Sequence[MatrixCell]) -> str:
     return ", ".join(
         f"{cell.stage}: {cell.use} on {cell.job}"
         for cell in cells
-        if (own := usual.get(cell.job)) and cell.iou == cell.iou
+        if (own := usual.get(cell.job)) and not math.isnan(cell.iou)
         and (cell.iou < LEAST_SHARE * own.iou or abs(cell.volume - own.volume) > OFF * own.volume)
     )  # fmt: skip
 

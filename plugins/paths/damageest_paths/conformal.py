@@ -18,7 +18,7 @@ from damageest_paths.obstacles import COARSER, Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.patches import Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
-from damageest_paths.process import GOLDEN, Pass, Plan, Process, extend_line
+from damageest_paths.process import Pass, Plan, Process, extend_line
 from damageest_paths.regions import cover, measure_length, resample
 from damageest_paths.sheets import (
     FINE,
@@ -32,7 +32,7 @@ from damageest_paths.sheets import (
 )
 from damageest_paths.sweeps import Sweeps
 from damageest_paths.unfilled import Unfilled
-from damageest_paths.weave import Line, Style
+from damageest_paths.weave import Line
 
 NO_FLOOR = "no side of it that lies on metal faces the build direction"
 STEPS = "the floor of the cavity has steps, and no even layer goes over them"
@@ -215,7 +215,7 @@ class _Work:
         wanted = patch.draw_region(reach, process)
         held = wanted ^ patch.draw_region(support, process)
         angle = process.angle + layer * process.turn
-        style = Style(process.is_along, layer * GOLDEN if process.starts == "spread" else 0.0)
+        style = process.choose_style(layer)
         lines = list_lines(held, process.pattern, process.bead, angle, None, process.shortest, None, style)
         long = [line for line in lines if measure_length(line.points) >= process.shortest]
         short = [line.points for line in lines if measure_length(line.points) < process.shortest]

@@ -33,7 +33,7 @@ def measure_air(path: DepositPath, left: Solid | None) -> Floats:
         return found
     places, normals = find_middles(path)[own], path.normals[own]
     height = path.heights[path.part[own] - 1]
-    below = _find_beads_below(path, own)
+    below = _find_beads_below(path, places, normals, own)
     if left is not None:
         below = np.minimum(below, _find_metal_below(path, places, normals, own, left))
     air = np.maximum(below - height, 0.0)
@@ -50,9 +50,8 @@ def _find_metal_below(path: DepositPath, places: Floats, normals: Floats, own: I
     return np.asarray(np.median(np.array(depths), axis=0))
 
 
-def _find_beads_below(path: DepositPath, own: Ints) -> Floats:
+def _find_beads_below(path: DepositPath, places: Floats, normals: Floats, own: Ints) -> Floats:
     """The distance (K,) from the middle of each move down to the top of a bead of an earlier layer; inf without."""
-    places, normals = find_middles(path)[own], path.normals[own]
     rank = path.part[own] * (int(path.layer.max()) + 1) + path.layer[own]
     height = float(path.heights.max())
     tree = KDTree(places)

@@ -64,10 +64,13 @@ class Process:
     is_along: bool = True
     starts: Literal["spread", "aligned"] | Floats = "spread"
 
-    def choose_style(self, layer: int, region: Any, frame: Frame) -> Style:
-        """How rows and rings of a layer run in a region of a plane across the frame's z."""
-        if isinstance(self.starts, str):
-            return Style(self.is_along, layer * GOLDEN if self.starts == "spread" else 0.0)
+    def choose_style(self, layer: int, region: Any = None, frame: Frame | None = None) -> Style:
+        """How rows and rings of a layer run in a region of a plane across the frame's z; without these, a place near to
+        which rings begin has no direction, and they begin alike."""
+        if isinstance(self.starts, str) or frame is None:
+            return Style(
+                self.is_along, layer * GOLDEN if isinstance(self.starts, str) and self.starts == "spread" else 0.0
+            )
         left, low, right, high = region.bounds()
         x, y, _ = frame.to_local(self.starts)
         return Style(self.is_along, float(np.arctan2(y - (low + high) / 2, x - (left + right) / 2)))

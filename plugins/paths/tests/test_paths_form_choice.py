@@ -97,3 +97,12 @@ def test_metal_is_not_spared_where_much_would_be_left_unfilled(monkeypatch: pyte
     path = plan(notch(3.0, 3.0), direction=UP, axes=5)
     assert sunk(path) > MUCH_SUNK
     assert any("of intact metal" in note for note in path.notes), "it is said"
+
+
+def test_a_place_for_the_starts_of_rings_fails_on_no_form() -> None:
+    """On layers that follow the floor it has no direction: they are planned as if aligned."""
+    given, aligned = (
+        plan(dent(), direction=UP, layers="conformal", axes=5, simulate=False, pattern="contour", starts=one)
+        for one in ({"at": [5.0, 0.0, 0.0]}, "aligned")
+    )
+    assert np.array_equal(given.points, aligned.points)
