@@ -99,6 +99,7 @@ def test_metal_is_not_spared_where_much_would_be_left_unfilled(monkeypatch: pyte
     assert any("of intact metal" in note for note in path.notes), "it is said"
 
 
+@pytest.mark.slow
 def test_a_place_for_the_starts_of_rings_fails_on_no_form() -> None:
     """On layers that follow the floor it has no direction: they are planned as if aligned."""
     given, aligned = (
