@@ -94,6 +94,7 @@ def main() -> None:
     """Runs the command line. Exit status 0: done; 1: a stage failed or refused; 2: the job or an input is not valid."""
     _process.is_command = True
     os.environ.update(ONE_THREAD)
+    _interrupt.keep_interrupts()
     _streams.prepare()
     try:
         _call_app()

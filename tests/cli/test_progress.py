@@ -51,6 +51,33 @@ def allow_interrupts() -> None:
     signal.signal(signal.SIGINT, signal.SIG_DFL)  # shells let what runs in the background ignore it
 
 
+DROPPING = """
+import signal, sys, time
+from damageest.cli import app, main
+class Dying:
+    def __del__(self):
+        signal.raise_signal(signal.SIGINT)
+@app.command("die")
+def die():
+    dying = Dying()
+    del dying
+    time.sleep(30)
+sys.argv = ["damageest", "die"]
+main()
+"""
+
+
+def test_an_interrupt_in_a_destructor_is_not_lost() -> None:
+    """Python only prints an exception there, and the run would go on."""
+    done = subprocess.run(
+        [sys.executable, "-c", DROPPING], capture_output=True, text=True, preexec_fn=allow_interrupts, timeout=25,
+    )  # fmt: skip
+    assert done.returncode == 130, done.stderr
+    assert done.stderr.splitlines() == [
+        "interrupted; finished stages are kept, and the same command continues after them"
+    ]
+
+
 WAITING = '''
 import time
 from pathlib import Path
