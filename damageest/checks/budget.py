@@ -33,12 +33,12 @@ SOURCES: dict[str, Source] = {
     "noise": Source("noise of the points on the inner surface", "A"),
     "spacing": Source("surface between the points, calibrated on simulated damages", "B"),
     "rim": Source("where the inner surface meets the skin, calibrated on simulated damages", "B"),
-    "pose": Source("pose, as the intact points fix it", "A"),
-    "adapt": Source("field that the part was adapted by", "A"),
+    "pose": Source("pose, fitted to the intact points", "A"),
+    "adapt": Source("adaptation of the part", "A"),
     "form": Source("intact skin that deviates over whole areas", "A"),
-    "outward": Source("skin that lies as far outside the part", "B"),
-    "views": Source("views that differ where they overlap", "A"),
-    "tessellation": Source("triangles in place of the CAD surface", "B", "rectangular"),
+    "outward": Source("skin as far outside the part", "B"),
+    "views": Source("disagreement of overlapping views", "A"),
+    "tessellation": Source("tessellation of the CAD surface", "B", "rectangular"),
     "probing_form": Source("probing form error beyond the noise and the form that the scan shows", "B"),
     "probing_size": Source("probing size error: half of it is an offset of the surface", "B"),
     "length": Source("length measurement error over the part's diagonal, as a scale", "B"),
@@ -109,12 +109,12 @@ def make_volume_budget(
         *_list_terms(scanner, gather("scanner")),
     ]
     bounds = [
-        BudgetBound("free", "motions that the scan does not exclude", *free),
-        BudgetBound("closed", "inner surface closed across what was not seen", -sum(x.less for x in errors), 0.0),
-        BudgetBound("inside", "no points show the inner surface", 0.0, sum(x.inside for x in errors)),
-        BudgetBound("beside", "skin beside it is not seen", 0.0, sum(x.beside for x in errors)),
-        BudgetBound("form", "the field that adapts the part makes it thinner", 0.0, sum(x.taken for x in errors)),
-        BudgetBound("fading", "it fades out beyond its rim", 0.0, sum(x.fading for x in errors)),
+        BudgetBound("free", "motions that the scan leaves free", *free),
+        BudgetBound("closed", "inner surface closed across unseen places", -sum(x.less for x in errors), 0.0),
+        BudgetBound("inside", "inner surface without points", 0.0, sum(x.inside for x in errors)),
+        BudgetBound("beside", "unseen skin beside the site", 0.0, sum(x.beside for x in errors)),
+        BudgetBound("form", "adaptation that makes the part thinner", 0.0, sum(x.taken for x in errors)),
+        BudgetBound("fading", "loss that fades out beyond the rim", 0.0, sum(x.fading for x in errors)),
         BudgetBound("doubtful", "sites that are not accepted, and places that may be damage", 0.0, doubtful),
     ]
     return _sum_up(parts, bounds, -sum(one.excess for one in errors))
@@ -126,7 +126,7 @@ def make_depth_budget(error: SiteError, scanner: ScannerErrors, unit: str) -> Bu
         return None
     parts = [_Parts(name, np.array([value]), value, unit) for name, value in error.depth_by.items()]
     parts += _list_terms(scanner, error.depth_scanner)
-    bounds = [BudgetBound("free", "motions that the scan does not exclude", -error.depth_free, error.depth_free)]
+    bounds = [BudgetBound("free", "motions that the scan leaves free", -error.depth_free, error.depth_free)]
     if error.depth + WIDTH * error.depth_error > error.measured:
         most = max(error.measured - error.depth, 0.0)
         bounds.append(BudgetBound("measured", "ends at what the scan points show", -np.inf, most))

@@ -23,29 +23,37 @@ from damageest.stages.report._section import draw_histogram
 from damageest.stages.report._sections import draw_sections, group_sections
 from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, list_sensor, show_total_interval
+from damageest.stages.report._words import ENGLISH_WORDS, N_, Words
 
 FOLDER = Path(__file__).parent / "page"
 DEFINE = "window.define = (name, needs, make) => { window.k3d = make(); };"
 """The script that takes the library of the 3D view over."""
 LABELS = {
-    "intact": "on the nominal surface",
-    "damage": "in a site",
-    "added": "on surplus",
-    "outlier": "in neither",
+    "intact": N_("points on the nominal surface"),
+    "damage": N_("points in a site"),
+    "added": N_("points on surplus"),
+    "outlier": N_("other points"),
 }
 """Label of result.json to what the page says of its points."""
 WHY = {
-    "hidden": "hidden by the part from every scanner position",
-    "outside": "outside every view",
-    "no points": "in view, but without points",
-    "earlier scan": "not in the earlier scan either",
-    "unknown": "not known",
+    "hidden": N_("hidden by the part from every scanner position"),
+    "outside": N_("outside every view"),
+    "no points": N_("in view, but without points"),
+    "earlier scan": N_("not in the earlier scan either"),
+    "unknown": N_("unknown"),
 }
+
+SCRIPT = (
+    N_("as designed"), N_("as it is"), N_("{factor} times"), N_("site {number}:"), N_("all {count}"),
+    N_("1 to {last} of {count}"),
+)  # fmt: skip
+"""Texts of the page's script."""
 
 
 def fill_page(
-    result: Result, content: Mapping[str, Any], job_text: str, scene: Scene, sites: list[Shown], start: Floats
-) -> str:
+    result: Result, content: Mapping[str, Any], job_text: str, scene: Scene, sites: list[Shown], start: Floats,
+    words: Words,
+) -> str:  # fmt: skip
     """The whole page as text. ``start``: the direction (3,) from which the 3D view looks at first."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
@@ -61,7 +69,9 @@ def fill_page(
         "share": style.format_share,
         "at": _format_point,
         "png": embed_png,
+        "told": words.tell,
     }
+    environment.globals |= {"t": words.tell, "language": words.language}
     environment.filters["name"] = lambda path: Path(path).name
     view = {
         "objects": scene.objects,
@@ -72,6 +82,7 @@ def fill_page(
         "size": scene.size,
         "unit": result.units,
         "exaggerate": scene.exaggerate,
+        "words": {text: words.tell(text) for text in SCRIPT},
     }
     scripts = [DEFINE, _read_library(), (FOLDER / "report.js").read_text(encoding="utf-8")]
     return environment.get_template("report.html").render(
@@ -83,11 +94,11 @@ def fill_page(
         drawn=MOST_DRAWN,
         exaggerated=EXAGGERATED,
         heights=max((item["height"] for item in scene.objects), default=0),
-        verdict=describe_run(result),
+        verdict=describe_run(result, words),
         tone=choose_tone(result),
-        volumes=result.describe_volumes(),
+        volumes=_describe_volumes(result, words),
         total=f"{style.format_number(result.damage_volume)} {result.units}³",
-        interval=show_total_interval(result),
+        interval=show_total_interval(result, words),
         scene=scene,
         layers=[(name, *LAYERS[name]) for name in _used_layers(scene)],
         view=view,
@@ -96,17 +107,17 @@ def fill_page(
         policy=make_policy(scripts),
         look=(FOLDER / "report.css").read_text(encoding="utf-8"),
         map_colours=_sample_map(),
-        histogram=draw_histogram(result),
+        histogram=draw_histogram(result, words),
         labels=LABELS,
-        sections=group_sections(result),
+        sections=group_sections(result, words),
         drawings=draw_sections(result),
-        fit=list_fit(result),
+        fit=list_fit(result, words),
         freedom=list_freedom(result),
-        sensor=list_sensor(result),
+        sensor=list_sensor(result, words),
         why=WHY,
         hashes=_hash_scans(result, content),
         job=job_text,
-        dates=_list_dates(result),
+        dates=_list_dates(result, words),
         seconds=sum(record.seconds for record in result.stages),
         cached=sum(record.cached for record in result.stages),
     )
@@ -119,28 +130,28 @@ def make_policy(scripts: Sequence[str]) -> str:
     return f"{fixed}; script-src {allowed}"
 
 
-def describe_run(result: Result) -> str:
+def describe_run(result: Result, words: Words = ENGLISH_WORDS) -> str:
     """The verdict on the run in one sentence."""
-    coverage = result.coverage
-    seen = coverage.seen if coverage else 1.0
-    on = f" on the {style.format_share(seen)} of the skin that the scan shows" if seen < 0.995 else ""
+    tell, failed = words.tell, len(result.failures)
+    seen = result.coverage.seen if result.coverage else 1.0
+    shown = tell("on the {share} of the skin that the scan shows", share=style.format_share(seen))
+    on = f" {shown}" if seen < 0.995 else ""
     if not result.sites:
-        if result.failures:
-            return (
-                f"Incomplete: {_count(len(result.failures), 'site')} without a damage volume, and no other was found."
-            )
+        if failed:
+            return f"{tell('Incomplete: no damage volume was found')} ({_count(failed, words)})."
         depth = f"{style.format_number(result.tolerance)} {result.units}"
-        return f"No damage deeper than the tolerance of {depth} was found{on}{qualify_nothing(result.warnings)}."
+        text = tell("No damage deeper than the tolerance of {depth} was found", depth=depth)
+        more = " " + tell("that errors of the scan do not explain") if qualify_nothing(result.warnings) else ""
+        return f"{text}{on}{more}."
     levels = [site.verdict.level for site in result.sites]
-    parts = [f"{levels.count(level)} {level}" for level in ("proven", "likely", "doubtful") if level in levels]
-    counted = f"all {levels[0]}" if len(parts) == 1 and len(levels) > 1 else ", ".join(parts)
-    counted = levels[0] if len(levels) == 1 else counted
-    out = sum(not site.accepted for site in result.sites)
-    text = f"{_count(len(levels), 'site')}{on}: {counted}"
-    named = "none" if out == len(levels) else f"{len(levels) - out}"
-    text += f"; {named} of them part of the damage volume" if out else ""
-    failed = f"; incomplete: {len(result.failures)} failed" if result.failures else ""
-    return f"{text}{failed}."
+    names = {"proven": tell("proven"), "likely": tell("likely"), "doubtful": tell("doubtful")}
+    parts = [f"{levels.count(level)} {name}" for level, name in names.items() if level in levels]
+    counted = tell("all {level}", level=names[levels[0]]) if len(parts) == 1 and len(levels) > 1 else ", ".join(parts)
+    counted = names[levels[0]] if len(levels) == 1 else counted
+    text = f"{_count(len(levels), words)}{on}: {counted}"
+    if out := sum(not site.accepted for site in result.sites):
+        text += "; " + tell("{out} not part of the damage volume", out=out)
+    return text + ("; " + tell("incomplete: {failed} failed", failed=failed) if failed else "") + "."
 
 
 def choose_tone(result: Result) -> str:
@@ -151,8 +162,20 @@ def choose_tone(result: Result) -> str:
     return "likely" if "likely" in levels else "proven"
 
 
-def _count(number: int, word: str) -> str:
-    return f"{number} {word}{'' if number == 1 else 's'}"
+def _count(number: int, words: Words) -> str:
+    return words.count("{number} site", "{number} sites", number)
+
+
+def list_volumes(result: Result) -> list[tuple[str, float]]:
+    """Lost metal, cut-back and stock, where there is more than the first."""
+    if not result.describe_volumes():
+        return []
+    more = ((N_("cut-back"), result.cut_back_volume), (N_("stock"), result.stock_volume))
+    return [(N_("lost metal"), result.lost_volume), *((name, volume) for name, volume in more if volume > 0)]
+
+
+def _describe_volumes(result: Result, words: Words) -> str:
+    return ", ".join(f"{words.tell(name)} {volume:.4g} {result.units}³" for name, volume in list_volumes(result))
 
 
 def _format_point(values: Any) -> str:
@@ -186,12 +209,12 @@ def _hash_scans(result: Result, content: Mapping[str, Any]) -> dict[str, str]:
     return {shown: file_sha256(Path(path)) if Path(path).is_file() else "" for shown, path in pairs}
 
 
-def _list_dates(result: Result) -> list[tuple[str, str]]:
+def _list_dates(result: Result, words: Words) -> list[tuple[str, str]]:
     """When the input files were changed last, and now. The page keeps it apart, since it is not the same twice."""
-    paths = [("part", result.part.path), *(("scan", path) for path in result.scan.paths)]
+    paths = [(words.tell("part"), result.part.path), *((words.tell("scan"), path) for path in result.scan.paths)]
     dates = []
     for kind, name in paths:
         if name and Path(name).is_file():
             changed = datetime.fromtimestamp(Path(name).stat().st_mtime, UTC)
-            dates.append((f"{kind} {Path(name).name} of", f"{changed:%Y-%m-%d %H:%M} UTC"))
-    return [*dates, ("report of", f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC")]
+            dates.append((words.tell("{file} of", file=f"{kind} {Path(name).name}"), f"{changed:%Y-%m-%d %H:%M} UTC"))
+    return [*dates, (words.tell("report of"), f"{datetime.now(UTC):%Y-%m-%d %H:%M} UTC")]

@@ -21,7 +21,7 @@ from damageest.io import colours
 from damageest.result import Result, Site
 from damageest.rules.notes import fold_notes
 from damageest.stages.report._drawing import draw
-from damageest.stages.report._page import choose_tone
+from damageest.stages.report._page import choose_tone, list_volumes
 from damageest.stages.report._pdf_book import Book, Letterhead, clean_line
 from damageest.stages.report._pdf_budget import show_budget
 from damageest.stages.report._pdf_parts import (
@@ -58,7 +58,7 @@ TRIANGLES = 60_000
 
 def write_pdf(
     path: Path, result: Result, content: Mapping[str, Any], job_text: str, sites: Sequence[Shown], remains: Remains,
-    direction: Any, letterhead: Letterhead, language: str,
+    direction: Any, letterhead: Letterhead, words: Words,
 ) -> None:  # fmt: skip
     """Writes the PDF. The same result gives the same bytes: there is no date but those that are signed.
 
@@ -66,7 +66,7 @@ def write_pdf(
     (3,): from which the part is looked at. Raises OSError where the logo cannot be read.
     """
     register_fonts()
-    book = Book(result, content, job_text, Words(language), letterhead)
+    book = Book(result, content, job_text, words, letterhead)
     story: list[Any] = [*_summarise(book, _draw_part(result, remains, direction))]
     if result.sections:
         story += [PageBreak(), *show_sections(book)]
@@ -111,14 +111,6 @@ def _draw_head(pen: Any, book: Book) -> None:
     pen.restoreState()
 
 
-def _list_volumes(result: Result) -> list[tuple[str, float]]:
-    """Lost metal, cut-back and stock, where there is more than the first."""
-    if not result.describe_volumes():
-        return []
-    more = (("cut-back", result.cut_back_volume), ("stock", result.stock_volume))
-    return [("lost metal", result.lost_volume), *((name, volume) for name, volume in more if volume > 0)]
-
-
 def _summarise(book: Book, image: bytes) -> list[Any]:
     result, content, tell, number = book.result, book.content, book.words.tell, book.words.number
     cubic = f"{book.unit}³"
@@ -127,7 +119,7 @@ def _summarise(book: Book, image: bytes) -> list[Any]:
         (tell("scan"), _name_scans(book)),
         (tell("damage volume"), f"{number(result.damage_volume)} {cubic}"),
         (tell("95 % interval"), book.interval(result.volume_95, cubic)),
-        *((tell(name), f"{number(volume)} {cubic}") for name, volume in _list_volumes(result)),
+        *((tell(name), f"{number(volume)} {cubic}") for name, volume in list_volumes(result)),
         (tell("tolerance"), f"{number(result.tolerance, 3)} {book.unit}"),
     ]
     if result.coverage is not None:
@@ -273,7 +265,7 @@ def _show_site(book: Book, site: Site, shown: Shown) -> list[Any]:
         legend = tell("section through the deepest point; grey: part as designed, red: damage, green: scan points")
         story += [head(tell("Section")), Plot(drawing, 0.8 * WIDTH, clean_line(legend))]
     story.append(head(tell("Reasons")))
-    reasons = shown.reasons or [tell("Nothing in the scan speaks against it.")]
+    reasons = shown.reasons or [tell("The scan gives no reason to doubt this site.")]
     story += [write(f"– {text}", 8) for text in reasons]
     known = site.uncertainty
     if known is not None and known.budget is not None:

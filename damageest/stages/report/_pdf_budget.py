@@ -11,35 +11,6 @@ from damageest.findings import Budget
 from damageest.stages.report._pdf_book import Book
 from damageest.stages.report._pdf_parts import SOFT, WIDTH, grid_table, head, write
 
-N_ = str
-"""Marks texts that are translated where they are shown."""
-TOLD = (
-    N_("normal"), N_("rectangular"),
-    N_("noise of the points on the inner surface"),
-    N_("surface between the points, calibrated on simulated damages"),
-    N_("where the inner surface meets the skin, calibrated on simulated damages"),
-    N_("pose, as the intact points fix it"),
-    N_("field that the part was adapted by"),
-    N_("intact skin that deviates over whole areas"),
-    N_("skin that lies as far outside the part"),
-    N_("views that differ where they overlap"),
-    N_("triangles in place of the CAD surface"),
-    N_("probing form error beyond the noise and the form that the scan shows"),
-    N_("probing size error: half of it is an offset of the surface"),
-    N_("length measurement error over the part's diagonal, as a scale"),
-    N_("temperature of the part"),
-    N_("coefficient of expansion of the part"),
-    N_("scale of the scan, fitted to the part"),
-    N_("motions that the scan does not exclude"),
-    N_("inner surface closed across what was not seen"),
-    N_("no points show the inner surface"),
-    N_("skin beside it is not seen"),
-    N_("it fades out beyond its rim"),
-    N_("sites that are not accepted, and places that may be damage"),
-    N_("ends at what the scan points show"),
-)  # fmt: skip
-"""Words of the rows and bounds of a budget."""
-
 
 def show_budget(book: Book, budget: Budget, name: str, unit: str) -> list[Any]:
     """The budget of a quantity called ``name``, in its ``unit``: rows, sums, and the bounds that are in no row."""

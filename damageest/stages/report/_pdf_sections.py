@@ -10,15 +10,7 @@ from damageest.artefacts import Section
 from damageest.io.section_files import lay_out
 from damageest.stages.report._pdf_book import Book, clean_line
 from damageest.stages.report._pdf_parts import SOFT, WIDTH, Plot, grid_table, head, write
-from damageest.stages.report._sections import choose_decimals, collect_groups
-
-N_ = str
-"""Marks texts that are translated where they are shown."""
-QUANTITIES = (
-    N_("chord"), N_("leading edge"), N_("trailing edge"), N_("thickness"), N_("twist"), N_("bow"),
-    N_("bow from straight"), N_("lean"), N_("form"), N_("deepest"), N_("highest"), N_("line profile"), N_("diameter"),
-    N_("off centre"), N_("run-out"), N_("roundness"),
-)  # fmt: skip
+from damageest.stages.report._sections import choose_decimals, collect_groups, tell_quantity
 
 
 def show_sections(book: Book) -> list[Any]:
@@ -61,11 +53,7 @@ def _tabulate(book: Book, names: tuple[str, ...], sections: list[Section], decim
     rows = [["", *(f"{one.number}: {one.name}" for one in sections)]]
     rows.append([words.tell("seen"), *(words.share(one.seen) if one.contours else "–" for one in sections)])
     for k, name in enumerate(names):
-        bore, _, rest = name.partition(" ") if name.startswith("bore ") else ("", "", name)
-        if bore:
-            count, _, rest = rest.partition(" ")
-            bore = f"{words.tell('bore')} {count} "
-        line = [bore + words.tell(rest)]
+        line = [tell_quantity(name, words)]
         for one in sections:
             value = one.values[k]
             if value.measured is None:

@@ -18,22 +18,23 @@ from damageest.stages.report._scene_path import add_path
 from damageest.stages.report._scene_stage import Stage
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
 from damageest.stages.report._values import choose_least_ends
+from damageest.stages.report._words import N_
 
 LAYERS = {
-    "part": ("Part", True),
-    "scan": ("Scan, by signed deviation", False),
-    "points": ("Damage points", False),
-    "damage": ("Damage volumes", True),
-    "surface": ("Inner damage surfaces", False),
-    "deposit": ("Deposits", False),
-    "path": ("Deposition passes, by layer", True),
-    "tool": ("Nozzle and beam at the end of the layer", False),
-    "nozzle": ("Nozzle and beam where it is tightest", False),
-    "unreached": ("Deposit that no pass reaches", True),
-    "surplus": ("Surplus", True),
-    "unseen": ("Skin that the scan does not show", True),
-    "least": ("Least depth of a loss that can be seen", False),
-    "form": ("Form, exaggerated", False),
+    "part": (N_("Part"), True),
+    "scan": (N_("Scan, by signed deviation"), False),
+    "points": (N_("Damage points"), False),
+    "damage": (N_("Damage volumes"), True),
+    "surface": (N_("Inner damage surfaces"), False),
+    "deposit": (N_("Deposits"), False),
+    "path": (N_("Deposition passes, by layer"), True),
+    "tool": (N_("Nozzle and beam at the end of the layer"), False),
+    "nozzle": (N_("Nozzle and beam at the tightest place"), False),
+    "unreached": (N_("Unreached deposit"), True),
+    "surplus": (N_("Surplus"), True),
+    "unseen": (N_("Unseen skin"), True),
+    "least": (N_("Least visible depth of a loss"), False),
+    "form": (N_("Form, exaggerated"), False),
 }
 """Name in the page's script, to name on the page and whether it is shown at first."""
 

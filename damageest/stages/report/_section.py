@@ -14,6 +14,7 @@ from damageest.io.section_files import Drawing as Layout
 from damageest.io.section_files import round_nice
 from damageest.result import Result, Site
 from damageest.stages.report._svg import GROUND, INK, METAL, NO_FILL, SOFT, Drawing, choose_ticks
+from damageest.stages.report._words import ENGLISH_WORDS, Words
 
 MOST_POINTS = 700
 """Scan points of a drawing."""
@@ -144,7 +145,7 @@ def lay_out_site(result: Result, site: Site) -> Layout | None:
     return Layout((width, height + 18.0), 1.0, tuple(areas), tuple(areas), (), tuple(lines), (), (ruler, text))
 
 
-def draw_histogram(result: Result) -> str:
+def draw_histogram(result: Result, words: Words = ENGLISH_WORDS) -> str:
     """How far the intact points are from the skin, with the tolerance and the noise of the scan."""
     distance = result.deviation.distance[result.deviation.label == INTACT]
     reach = 1.25 * result.tolerance
@@ -162,8 +163,10 @@ def draw_histogram(result: Result) -> str:
         drawing.draw_lines(f"tolerance-{sign}", limit, "stroke:#d1495b;stroke-width:1.3;stroke-dasharray:4.8 2.1")
     _draw_axes(drawing, reach, top)
     centred = f"fill:{INK};text-anchor:middle;{FONT}"
-    drawing.write(f"signed distance to the nominal surface, {result.units}", (0, 0), (0, 31), centred)
-    drawing.turn_to_side("intact points, %", centred)
+    drawing.write(
+        words.tell("signed distance to the nominal surface, {unit}", unit=result.units), (0, 0), (0, 31), centred
+    )
+    drawing.turn_to_side(words.tell("intact points, %"), centred)
     return drawing.to_svg()
 
 

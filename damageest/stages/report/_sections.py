@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import dataclass
 
 from damageest.artefacts import Section, SectionValue
 from damageest.io.section_files import COLOURS, draw_section
 from damageest.result import Result
+from damageest.stages.report._words import N_, Words
 
 PAGE = {**COLOURS, "ink": "var(--ink)", "soft": "var(--soft)", "metal": "var(--metal)"}
+
+QUANTITIES = (
+    N_("chord"), N_("leading edge"), N_("trailing edge"), N_("thickness"), N_("twist"), N_("bow"),
+    N_("bow from straight"), N_("lean"), N_("form"), N_("deepest"), N_("highest"), N_("line profile"), N_("diameter"),
+    N_("off centre"), N_("run-out"), N_("roundness"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -29,11 +37,14 @@ class Group:
     rows: tuple[tuple[Section, tuple[Cell, ...]], ...]
 
 
-def group_sections(result: Result) -> list[Group]:
+def group_sections(result: Result, words: Words) -> list[Group]:
     """The sections of a result by their item of the job and the quantities that they have."""
     digits = choose_decimals(result.tolerance)
     return [
-        Group(names, tuple((one, tuple(show_value(value, digits) for value in one.values)) for one in sections))
+        Group(
+            tuple(tell_quantity(name, words) for name in names),
+            tuple((one, tuple(show_value(value, digits, words) for value in one.values)) for one in sections),
+        )
         for (_, names), sections in collect_groups(result).items()
     ]
 
@@ -51,7 +62,13 @@ def choose_decimals(tolerance: float) -> int:
     return max(2 - math.floor(math.log10(tolerance)), 0)
 
 
-def show_value(value: SectionValue, decimals: int) -> Cell:
+def tell_quantity(name: str, words: Words) -> str:
+    """The name of a quantity, where that of a bore has its number."""
+    found = re.fullmatch(r"bore (\d+) (.+)", name)
+    return f"{words.tell('bore')} {found[1]} {words.tell(found[2])}" if found else words.tell(name)
+
+
+def show_value(value: SectionValue, decimals: int, words: Words) -> Cell:
     """A value as a cell of a table."""
 
     def show(number: float, plus: bool = False) -> str:
@@ -59,7 +76,8 @@ def show_value(value: SectionValue, decimals: int) -> Cell:
         return ("−" if number < 0 and float(text) else "+" if plus else "") + text
 
     if value.measured is None:
-        return Cell("–", f"nominal {show(value.nominal)}" if value.nominal else "", value.note)
+        nominal = words.tell("nominal {value}", value=show(value.nominal)) if value.nominal else ""
+        return Cell("–", nominal, value.note)
     sign = "°" if value.unit == "degrees" else ""
     error = f"± {show(2 * value.error)}" if value.error else ""
     if not value.nominal:

@@ -21,6 +21,7 @@ from damageest.stages.report._drawing import draw
 from damageest.stages.report._section import choose_plane, draw_section
 from damageest.stages.report._thin import thin_mesh
 from damageest.stages.report._values import list_path, show_interval, show_site_interval
+from damageest.stages.report._words import Words
 
 PICTURE, SMALLER, THUMBNAIL = (320, 240), (240, 180), (104, 78)
 THUMBNAIL_TRIANGLES = 4000
@@ -60,7 +61,7 @@ class Shown:
     view: dict[str, Any] = field(default_factory=dict)
 
 
-def describe_sites(result: Result, content: Mapping[str, Any], remains: Remains) -> list[Shown]:
+def describe_sites(result: Result, content: Mapping[str, Any], remains: Remains, words: Words) -> list[Shown]:
     """Values, pictures and sections of all sites. ``content``: that of result.json."""
     if not result.sites:
         return []
@@ -68,12 +69,12 @@ def describe_sites(result: Result, content: Mapping[str, Any], remains: Remains)
     drawn = {s.id for s in sorted(result.sites, key=lambda s: -s.damage.volume)[:MOST_DRAWN]}
     shown = []
     for site, told in zip(result.sites, content["sites"], strict=True):
-        one = _describe(result, site, told)
+        one = _describe(result, site, told, words)
         mesh, rays = remains.without(site)
         view = choose_view(rays, site.surface, site.damage.bounds, result.part.diagonal)
         one.view = _to_plain(view)
         if site.id in drawn:
-            _draw_site(result, site, told, one, view, (rays, mesh), part)
+            _draw_site(result, site, told, one, view, (rays, mesh), part, words)
         shown.append(one)
     return shown
 
@@ -107,17 +108,17 @@ def choose_overview(result: Result, remains: Remains) -> Floats:
     return choose_view(rays, Mesh(vertices, faces), left.bounds, left.diagonal, OVERVIEWS).direction
 
 
-def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
+def _describe(result: Result, site: Site, told: Mapping[str, Any], words: Words) -> Shown:
     unit = result.units
     deposit = told["deposit"]
     rows = []
     if deposit is not None and site.deposit is not None:
-        rows = [("deposit", f"{style.format_number(deposit['volume'])} {unit}³")]
-        rows += [("stock of it", f"{style.format_number(deposit['stock_volume'])} {unit}³")]
+        rows = [(words.tell("deposit"), f"{style.format_number(deposit['volume'])} {unit}³")]
+        rows += [(words.tell("stock in it"), f"{style.format_number(deposit['stock_volume'])} {unit}³")]
         if deposit["cut_back_volume"]:
-            rows += [("cut back", f"{style.format_number(deposit['cut_back_volume'])} {unit}³")]
+            rows += [(words.tell("cut back"), f"{style.format_number(deposit['cut_back_volume'])} {unit}³")]
     elif site.refused:
-        rows = [("deposit", "none: the stage allowance refused this site")]
+        rows = [(words.tell("deposit"), words.tell("none: the stage allowance refused this site"))]
     return Shown(
         id=site.id,
         colour=colours.colour_site(site.id),
@@ -125,15 +126,15 @@ def _describe(result: Result, site: Site, told: Mapping[str, Any]) -> Shown:
         accepted=site.accepted,
         reasons=list(map(str, (*site.verdict.reasons, *site.warnings))),
         volume=f"{style.format_number(site.damage.volume)} {unit}³",
-        interval=show_site_interval(site, unit),
+        interval=show_site_interval(site, unit, words),
         depth=f"{style.format_number(site.max_depth, 3)} {unit}",
-        depth_interval=show_interval(site.depth_95, unit),
+        depth_interval=show_interval(site.depth_95, unit, words),
         area=f"{style.format_number(site.surface.area)} {unit}²",
         points=style.format_number(len(site.points)),
         method=site.method,
         faces=name_faces(result.part, site.damage, result.tolerance),
         deposit=rows,
-        path=list_path(site, unit),
+        path=list_path(site, unit, words),
         budget=(told.get("uncertainty") or {}).get("budget"),
         depth_budget=(told.get("uncertainty") or {}).get("depth_budget"),
     )
@@ -165,6 +166,7 @@ def _draw_site(
     view: View,
     left: tuple[RayCaster, Mesh],
     part: Any,
+    words: Words,
 ) -> None:
     rays, mesh = left
     smooth, near = len(result.sites) <= FEW, view._replace(radius=1.05 * view.radius)
@@ -178,7 +180,10 @@ def _draw_site(
     one.section, slab = draw_section(result, site, plane, part)
     at = ", ".join(style.format_number(x) for x in plane.origin)
     normal = ", ".join(style.format_number(x, 3) for x in np.round(plane.across, 4) + 0.0)
-    one.plane = f"through ({at}), normal ({normal}); scan points within {style.format_number(slab, 2)} {result.units}"
+    one.plane = words.tell(
+        "through ({at}), normal ({normal}); scan points within {distance}",
+        at=at, normal=normal, distance=f"{style.format_number(slab, 2)} {result.units}",
+    )  # fmt: skip
     deposit = site.deposit or site.damage
     shapes = [("damage", site.damage, one.colour), ("surface", site.surface, one.colour)]
     for kind, shape, colour in [*shapes, ("deposit", deposit, colours.DEPOSIT)]:

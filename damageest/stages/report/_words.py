@@ -1,4 +1,4 @@
-"""The words of the PDF in the language of the job, from gettext's catalogues in ``locale/``.
+"""The fixed texts of page and PDF in the language of the job, from gettext's catalogues in ``locale/``.
 
 The texts in the code are English. A language is a folder ``locale/<language>/LC_MESSAGES`` with ``damageest.po`` and
 the ``damageest.mo`` made from it (``msgfmt``, or ``pybabel compile``).
@@ -10,6 +10,8 @@ import gettext
 import math
 from pathlib import Path
 
+N_ = str
+"""Marks texts that are translated where they are shown."""
 FOLDER = Path(__file__).parent / "locale"
 ENGLISH = "en"
 DECIMAL_MARK = "decimal mark: ."
@@ -58,3 +60,6 @@ class Words:
     def share(self, value: float) -> str:
         """A share in percent; never 100 for less than all of it."""
         return "100 %" if value >= 1 else f"{self.fixed(min(100 * value, 99.9), 1)} %"
+
+
+ENGLISH_WORDS = Words(ENGLISH)

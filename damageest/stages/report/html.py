@@ -29,12 +29,12 @@ class Html(Report):
         description="most scan points that the 3D view shows; the others are thinned out",
     )
     triangles: int = Field(
-        120_000, ge=1000, le=1_000_000, description="about how many triangles the 3D view shows; meshes are simplified"
+        120_000, ge=1000, le=1_000_000, description="number of triangles in the 3D view, about; meshes are simplified"
     )
     pdf: bool = Field(False, description="whether `report.pdf`, A4, is written too; needs the extra `pdf`")
     company: str = Field("", max_length=80, description="name at the head of each page of the PDF")
     logo: JobPath | None = Field(None, description="PNG or JPEG file at the head of each page of the PDF")
-    language: str = Field("en", description="language of the PDF: en, de; reasons and notes are English")
+    language: str = Field("en", description="language of page and PDF: en, de; reasons and notes are English")
 
     @field_validator("language")
     @classmethod
@@ -63,15 +63,17 @@ class Html(Report):
         return [(("logo",), f"{self.logo} is neither PNG nor JPEG; save it as one of them")]
 
     def run(self, result: Result, folder: Path, content: Mapping[str, Any], job_text: str) -> ReportFiles:
-        """Writes ``report.html``, and ``report.pdf`` where it is asked for, into ``folder``."""
+        """Writes ``report.html``, and ``report.pdf`` where the job wants it, into ``folder``."""
         from damageest.stages.report._page import fill_page
         from damageest.stages.report._scene import build_scene
         from damageest.stages.report._sites import Remains, choose_overview, describe_sites
+        from damageest.stages.report._words import Words
 
+        words = Words(self.language)
         scene, remains = build_scene(result, self.points, self.triangles), Remains(result)
-        sites = describe_sites(result, content, remains)
+        sites = describe_sites(result, content, remains, words)
         start = choose_overview(result, remains)
-        page = fill_page(result, content, job_text, scene, sites, start)
+        page = fill_page(result, content, job_text, scene, sites, start, words)
         (folder / "report.html").write_text(page, encoding="utf-8")
         files = ["report.html"]
         if self.pdf:
@@ -79,7 +81,7 @@ class Html(Report):
             from damageest.stages.report._pdf_book import Letterhead
 
             head = Letterhead(self.company, self.logo)
-            write_pdf(folder / "report.pdf", result, content, job_text, sites, remains, start, head, self.language)
+            write_pdf(folder / "report.pdf", result, content, job_text, sites, remains, start, head, words)
             files.append("report.pdf")
         picture = next((site.picture for site in sites if site.picture), b"")
         return ReportFiles(tuple(files), picture=picture)

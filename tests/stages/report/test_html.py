@@ -89,6 +89,29 @@ def test_it_shows_the_values_of_each_site(page: Page) -> None:
     assert "2 sites: 1 proven, 1 likely." in page.text
 
 
+def test_no_fixed_text_of_the_page_bypasses_the_catalogue() -> None:
+    names = {"sha", "part", "scan", "scanner", "temperature", "JCGM", "GUM"}  # of files, of the job, of a guide
+    for path in (Path(damageest.__file__).parent / "stages/report/page").glob("*.html"):
+        text = re.sub(r"<!--.*?-->|{%.*?%}|{{.*?}}", " ", path.read_text(), flags=re.DOTALL)
+        attributes = re.findall(r'(?:aria-label|alt|title)="([^"]*)"', text)
+        shown = " ".join([re.sub(r"<[^>]*>", " ", text), *attributes])
+        words = set(
+            re.findall(r"[^\W\d_]{3,}", re.sub(r"(?s)<style>.*?</style>|^\.bar .*?$", "", shown, flags=re.MULTILINE))
+        )
+        assert not words - names, path.name
+
+
+@pytest.mark.slow
+def test_the_page_in_german_has_the_same_values() -> None:
+    english, german = (
+        Page(DATES.sub("", pages.write(pages.two_sites(), stage=Html(language=one)).read_text())).text
+        for one in ("en", "de")
+    )
+    for text in ("2 Stellen: 1 nachgewiesen, 1 wahrscheinlich.", "Schadensvolumen", "Rauschen", "In 3D zeigen"):
+        assert text in german, text
+    assert sorted(re.findall(r"\d+\.\d+", german)) == sorted(re.findall(r"\d+\.\d+", english))
+
+
 def test_every_picture_has_a_text(page: Page) -> None:
     pictures = [attributes for tag, attributes in page.tags if tag == "img"]
     assert len(pictures) >= 2 * 4

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 import damageest
+from damageest.checks import budget
 from damageest.errors import JobError
 from damageest.job import load
 from damageest.registry import Registry
@@ -18,14 +19,14 @@ from tests.needs import import_or_skip
 pypdfium2 = import_or_skip("pypdfium2")
 import_or_skip("reportlab")
 
-REPORT = "report: {{use: html, pdf: yes, company: Müller & Söhne, language: {}}}\nsections: [{{y: 0}}]\n"
+SETTING = "report: {{use: html, pdf: yes, company: Müller & Söhne, language: {}}}\nsections: [{{y: 0}}]\n"
 SMALL = damaged_box.JOB.replace("report: none\n", "").replace("0.2", "0.4")
-SOURCES = (Path(damageest.__file__).parent / "stages/report").glob("_pdf*.py")
+REPORT = Path(damageest.__file__).parent / "stages/report"
 
 
 def run(job: Path, language: str) -> list[str]:
     """The text of each page."""
-    job.write_text(SMALL + REPORT.format(language))
+    job.write_text(SMALL + SETTING.format(language))
     damageest.run(job, output=True)
     document = pypdfium2.PdfDocument(job.parent / "out/job/report.pdf")
     return [page.get_textpage().get_text_range() for page in document]
@@ -64,14 +65,17 @@ def test_the_pdf_in_german_and_in_english_again(small_done: Path) -> None:
     assert (small_done.parent / "out/job/report.pdf").read_bytes() == first
 
 
-def test_every_text_of_the_pdf_is_in_each_catalogue() -> None:
+def test_every_text_of_page_and_pdf_is_in_each_catalogue() -> None:
     pofile = import_or_skip("babel.messages.pofile")
-    texts = set()
-    for path in SOURCES:
+    texts = {*(source.text for source in budget.SOURCES.values()), *budget.UNKNOWN.values(), "normal", "rectangular"}
+    texts |= set(re.findall(r'BudgetBound\("\w+", "([^"]*)"', Path(budget.__file__).read_text()))
+    for path in REPORT.rglob("*.py"):
         source = path.read_text()
         texts |= set(re.findall(r'(?:tell|N_)\(\s*"((?:[^"\\]|\\.)*)"', source))
-        texts |= set(re.findall(r'count\(\s*"([^"]*)"', source))
-    assert len(texts) > 50
+        texts |= set(re.findall(r"count\(\s*[\"']([^\"']*)", source))
+    for path in REPORT.rglob("*.html"):
+        texts |= set(re.findall(r'\bt\("([^"]*)"', path.read_text()))
+    assert len(texts) > 200
     for language in list_languages()[1:]:
         with (FOLDER / language / "LC_MESSAGES/damageest.po").open("rb") as file:
             catalogue = pofile.read_po(file)

@@ -1,6 +1,7 @@
 "use strict";
 (() => {
   const scene = JSON.parse(document.getElementById("scene").textContent);
+  const words = scene.words;
   const find = (selector) => Array.from(document.querySelectorAll(selector));
   const holder = document.getElementById("canvas");
   const FOV = 35, NEAR = 0.62;
@@ -98,7 +99,7 @@
   // the snapshot has the part as designed at time 0, and with its displacement times the slider's end there
   function exaggerate() {
     const slider = document.getElementById("exaggerate"), factor = Number(slider.value);
-    const said = { 0: "as designed", 1: "as it is" }[factor] || `${factor} times`;
+    const said = { 0: words["as designed"], 1: words["as it is"] }[factor] || words["{factor} times"].replace("{factor}", factor);
     document.getElementById("exaggerate-text").textContent = said;
     return view3d.setTime(factor).then(showObjects);
   }
@@ -108,8 +109,9 @@
     for (const item of scene.objects) {
       if (item.minutes !== undefined && item.height <= Number(slider.value)) done[item.site] = item.minutes;
     }
-    const sites = Object.keys(done), times = sites.map((site) => (sites.length > 1 ? `site ${site}: ` : "") + `${done[site]} min`);
-    const upTo = slider.value === slider.max ? `all ${slider.max}` : `1 to ${slider.value} of ${slider.max}`;
+    const sites = Object.keys(done), times = sites.map((site) => (sites.length > 1 ? `${words["site {number}:"].replace("{number}", site)} ` : "") + `${done[site]} min`);
+    const upTo = (slider.value === slider.max ? words["all {count}"] : words["1 to {last} of {count}"])
+      .replace("{last}", slider.value).replace("{count}", slider.max);
     document.getElementById("height-text").textContent = `${upTo} · ${times.join(", ")}`;
   }
 
