@@ -58,14 +58,14 @@ def read_aim(folder: Path, step: Step) -> Aim:
         thickness = (site.get("deposit") or {}).get("thickness")
         stock[site["id"]] = float(thickness["min"]) if thickness else 0.0
     if not deposits:
-        raise InputError(f"{folder}: the result has no site that is to be repaired")
+        raise InputError(f"{folder}: the result has no accepted site to repair")
     nominal = _read_nominal(output, deposits)
     origin = nominal.bounds.mean(axis=0)
     target: Mesh | None = nominal
     if step == "deposited":
         target = to_solid(unite([nominal, *deposits.values()], origin), origin)
         if target is None:
-            raise InputError(f"{folder}: part and deposits give no solid")
+            raise InputError(f"{folder}: part and deposits do not unite to one solid; run the job again")
     assert target is not None
     return Aim(output, step, Part(target.vertices, target.faces, unit=output.unit), nominal, deposits, stock,
                tuple(refused))  # fmt: skip
@@ -77,7 +77,7 @@ def _read_nominal(output: OutputFolder, deposits: dict[int, Solid]) -> Solid:
     lost = [output.read_solid("damage", number) for number in deposits]
     if undamaged is None or any(body is None for body in lost):
         raise InputError(
-            f"{output.folder}: undamaged part and damage volumes are in no file that can be read; run the job again "
+            f"{output.folder}: no readable file has the undamaged part and the damage volumes; run the job again "
             "with export: {format: [ply]}"
         )
     origin = undamaged.bounds.mean(axis=0)
@@ -86,7 +86,9 @@ def _read_nominal(output: OutputFolder, deposits: dict[int, Solid]) -> Solid:
     whole = unite([_swell(body) for body in bodies], origin)
     solid = to_solid(whole, origin)
     if solid is None:
-        raise InputError(f"{output.folder}: undamaged part and damage volumes give no solid")
+        raise InputError(
+            f"{output.folder}: undamaged part and damage volumes do not unite to one solid; run the job again"
+        )
     return solid
 
 

@@ -146,7 +146,7 @@ def _choose_temperature(content: Mapping[str, Any], question: Question) -> dict[
     asked = content["provenance"]["job"].get("temperature")
     if asked is None:
         if question.part_temperature is not None:
-            raise InputError("--part-temperature: the job has no  temperature  with the expansion of the material")
+            raise InputError("--part-temperature: the job gives no expansion of the material; add  temperature  to it")
         return {}
     if question.part_temperature is not None:
         asked = {**asked, "part": question.part_temperature}
@@ -157,11 +157,11 @@ def _choose_pose(content: Mapping[str, Any], same_setup: bool) -> tuple[Any, str
     """The options of `align`, and in words what the pose is from."""
     if same_setup:
         transform = content["alignment"]["transform"]
-        return {"use": "none", "T_part_scan": transform}, "that of the scan before: the part was not moved"
+        return {"use": "none", "T_part_scan": transform}, "of the scan before: the part was not moved"
     asked = content["provenance"]["job"].get("align") or {}
     if isinstance(asked, Mapping) and asked.get("datum"):
         return dict(asked), "fitted to the datums of the job"
-    return "register", "fitted to the skin; repaired places that deviate pull as little as damage does"
+    return "register", "fitted to the skin; deviating repaired places have as little weight as damage"
 
 
 def _list_notes(result: Result) -> tuple[str, ...]:

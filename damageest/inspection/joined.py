@@ -19,8 +19,8 @@ HIGHEST = 10.0
 FEWEST = 3
 """Points of a body that touch a site's skin where it is joined to it."""
 NOTE = (
-    "a body beside the part, as a fixture, touches the finished skin of {where}: it counts as metal that is over; if "
-    "it is a fixture, name it in the job, as  inspect: {{fixtures: [{{min: [..], max: [..]}}]}}, or scan without it"
+    "a body beside the part touches the finished skin of {where} and counts as excess metal; if it is a fixture, "
+    "name it in the job:  inspect: {{fixtures: [{{min: [..], max: [..]}}]}}, or scan without it"
 )
 
 

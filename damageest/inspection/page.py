@@ -72,7 +72,7 @@ def _describe_entry(entry: Mapping[str, Any], unit: str) -> str:
         f"<h2>Inspection: {_show(entry['step'])}, {_show(entry['time'])}</h2>"
         f"<p>{_show(entry['scan']['name'])}, {entry['scan']['points']} points<br>"
         f"<code>sha256 {_show(entry['scan']['sha256'])}</code></p>"
-        f"<p>Pose {_show(entry['pose']['by'])}; the scan is off skin that was not repaired by {_number(off)} {unit} "
+        f"<p>Pose {_show(entry['pose']['by'])}; deviation from unrepaired skin {_number(off)} {unit} "
         f"(rms). Tolerance {_number(entry['tolerance'])} {unit}.</p>{verdicts}{findings}"
         + "".join(f"<p class='note'>{_show(note)}</p>" for note in entry["notes"])
     )
@@ -88,7 +88,7 @@ def _describe_lost(before: Mapping[str, Any], unit: str) -> str:
 def _describe_shown(one: Mapping[str, Any], unit: str) -> str:
     if one.get("shows") is None:
         return ""
-    return f"<br><span class='note'>The scan shows defects from {_number(one['shows'])} {unit} across.</span>"
+    return f"<br><span class='note'>Smallest defect that the scan shows: {_number(one['shows'])} {unit}.</span>"
 
 
 def _interval(one: Mapping[str, Any]) -> str:

@@ -135,8 +135,7 @@ def read_record(path: Path, aim: Aim | None = None) -> dict[str, Any]:
         raise InputError(f"{path}: was changed after it was written")
     if aim is not None and record["workpiece"]["result_sha256"] != aim.folder.content["provenance"]["sha256"]:
         raise InputError(
-            f"{path}: is the record of another result: the job was run again after it was begun; keep it under another "
-            "name, and inspect again to begin a new one"
+            f"{path}: belongs to an earlier result of this job; rename it, and inspect again to start a new record"
         )
     return record
 

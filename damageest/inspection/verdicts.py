@@ -60,7 +60,7 @@ def judge_site(
     """Judges a site by every point that lies on it. ``findings``: all of the part."""
     wrong = [f"{one.kind} {one.volume:.4g} {unit}³{_say_more(one)}" for one in findings if number in one.sites]
     if places is None or landed is None:
-        return Verdict(number, "not met" if wrong else "not shown", ", ".join(wrong) or "it has no skin of its own",
+        return Verdict(number, "not met" if wrong else "not shown", ", ".join(wrong) or "no skin of its own",
                        0.0, None, None, None)  # fmt: skip
     seen, shows, gap = _measure_seen(places, landed)
     groups = _measure_groups(places, landed)

@@ -18,7 +18,7 @@ FINEST = 150.0
 STEEPEST = 0.8
 """Largest change of the displacement per length. Below 1 on the way between two places, they do not meet: the deformed
 part has no self-intersection that the part as designed does not have."""
-REMEDY = "adapt: none; or crop what is not the part from the scan"
+REMEDY = "adapt: none; or crop other objects from the scan"
 
 
 def refine(part: Part, centre: Floats, tolerance: float, *fields: Field) -> tuple[Part, float]:
@@ -53,8 +53,7 @@ def require_injective(field: Field, turn: Floats, places: Floats, largest: float
     steep = float(np.linalg.norm(gradient - np.eye(3), ord=2, axis=(1, 2)).max())
     if steep > STEEPEST or float(np.linalg.det(gradient).min()) <= 0:
         raise StageError(
-            f"the field that fits the scan would fold the part: it changes by {steep:.2f} of a length, and at most "
-            f"{STEEPEST:g} is safe",
+            f"the deformation that fits the scan would fold the part: gradient {steep:.2f}, at most {STEEPEST:g} is safe",
             REMEDY,
         )
 

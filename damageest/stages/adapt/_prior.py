@@ -99,7 +99,7 @@ def read_prior(paths: Sequence[Path], part: Part, scan: Scan) -> list[MeasuredFo
     others = [form for form in forms if not form.is_of(scan)]
     if not others:
         raise StageError(
-            "prior: all files are from this scan, and a part says nothing about itself",
+            "prior: all files come from this scan, but other parts are needed",
             "give the files of other parts of the type, or remove prior",
         )
     return others
@@ -138,17 +138,15 @@ def describe_prior(start: Start, tolerance: float, unit: str) -> str:
     parts = f"{used.parts} other part{'' if used.parts == 1 else 's'} of the type"
     if not used.is_used:
         return (
-            f"the form of {parts} was not used, since this part deforms in another way (they leave {used.misfit:.3g} "
-            f"{unit} on its seen skin, usually up to {used.limit:.3g} {unit}); its own skin alone predicts lost skin"
+            f"the form of {parts} was not used: this part deforms in another way (residual {used.misfit:.3g} "
+            f"{unit} on its seen skin, usually up to {used.limit:.3g} {unit}); lost skin is predicted from its own seen skin"
         )
-    words = f"the form was predicted from {parts}, which leave {used.misfit:.3g} {unit} on its seen skin"
+    words = f"the form was predicted from {parts} (residual {used.misfit:.3g} {unit} on its seen skin)"
     if start.errors is None:
-        return (
-            f"{words}; so few say little about how parts differ, and lost skin is no better known: give {FEW} or more"
-        )
+        return f"{words}; too few to narrow the interval of lost skin: give {FEW} or more"
     unshown = float((start.family.count < FEW).mean())
     if unshown > 0.005:
-        words += f"; {100 * unshown:.2g} % of the skin is shown by fewer than {FEW} of them, and is no better known"
+        words += f"; fewer than {FEW} of them show {100 * unshown:.2g} % of the skin, whose interval stays as wide"
     return words
 
 

@@ -54,9 +54,9 @@ class Smooth(Adapt):
     """
 
     use: Literal["smooth"] = "smooth"
-    points: int = Option(12_000, ge=1000, le=200_000, description="scan points that the field is fitted to, about")
+    points: int = Option(12_000, ge=1000, le=200_000, description="number of scan points used for the fit, about")
     lattice: tuple[int, ...] = Option(
-        (4,), max_length=4, description="cells of the lattices that are tried, along the longest edge of the box"
+        (4,), max_length=4, description="cells of the lattices tried, along the longest edge of the box"
     )
 
     process: Literal["metal", "casting", "sheet", "polymer"] = Option(
@@ -76,7 +76,7 @@ class Smooth(Adapt):
         others = tuple(path for path in self.prior if path.parent != folder)
         if self.prior and not others:
             raise InputError(
-                f"adapt.prior: names no file but {self.prior[0]}, which this run writes anew; give the files of other "
+                f"adapt.prior: names only {self.prior[0]}, which this run overwrites; give the files of other "
                 "parts of the type"
             )
         return self.model_copy(update={"prior": others}) if len(others) < len(self.prior) else self

@@ -100,10 +100,10 @@ def describe_choice(choice: Choice) -> tuple[str, ...]:
         x, y, z = choice.axis.direction + 0.0
         return (
             f"the part fits at any angle about the axis ({x:.2f}, {y:.2f}, {z:.2f}) (symmetry): every turn is "
-            "correct, the machine has to use this one; the alternatives list quarter turns",
+            "correct; use this one on the machine; the alternatives list quarter turns",
         )
     if len(choice.others):
-        return (f"the part fits in {len(choice.others) + 1} poses equally well: the machine has to use this one",)
+        return (f"the part fits in {len(choice.others) + 1} poses equally well: use this one on the machine",)
     return ()
 
 
@@ -124,7 +124,7 @@ def note_ambiguity(choice: Choice, part: PreparedPart) -> tuple[Reason, ...]:
     if apart <= 0.002:
         return ()
     text = (
-        f"poses fit that are no symmetries of the part ({apart:.1%} of its surface differs): the damage found depends "
-        "on the pose, and the surface that would tell is missing, unseen or too alike"
+        f"other poses fit that are no symmetries ({apart:.1%} of the surface differs): the damage found depends "
+        "on the pose, and the surface that would decide is missing, unseen or too alike"
     )
     return (Reason("other_poses", text, "contradicts", apart, remedy=REMEDY),)

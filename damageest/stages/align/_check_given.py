@@ -92,5 +92,5 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
         # the pose was given, and wear explains it as well: it is told. Where the pose nearby leaves nothing off the
         # part, it contradicts sites that are no deeper than it moves the skin: in it, no metal is lost there
         effect: Effect = "contradicts" if fitted.on > ALL else "open"
-        doubts += (Reason("given_pose", text, effect, moved, part.unit, remedy="if it is the pose, use align: icp"),)
+        doubts += (Reason("given_pose", text, effect, moved, part.unit, remedy="if the pose is wrong, use align: icp"),)
     return doubts

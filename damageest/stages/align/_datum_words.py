@@ -44,10 +44,10 @@ def describe_system(frame: Frame, system: DatumSystem, fits: Fits, free: Floats,
         name = f"datum {feature.name} ({feature.kind})"
         datums.append(_summarise(frame, feature, fitted, radii, unit))
         if not taken.shape[1]:
-            notes.append(f"{name} has no effect: earlier datums fix all that it could, like parallel planes")
+            notes.append(f"{name} has no effect: earlier datums fix its directions already; name another face")
         if fitted.weak.shape[1]:
             named = _join(frame, fitted.weak, unit)
-            notes.append(f"{name}: its scanned part does not fix {named}, which counts as free")
+            notes.append(f"{name}: its scanned part does not fix {named}, which counts as free; scan more of it")
         depth = fitted.off * frame.size
         if fitted.contact < MIN_CONTACT:
             text = (

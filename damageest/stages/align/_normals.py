@@ -74,8 +74,8 @@ def note_inward(target: PartSurface, frame: Frame, scan: Scan, best: Fit) -> tup
     if inward < WRONG:
         return ()
     return (
-        f"normals in the file of the scan point into the part at {inward:.0%} of the points on its skin: their signs "
-        "were not used",
+        f"the scan's normals point into the part at {inward:.0%} of the points on its skin: their signs were ignored; "
+        "export the normals outward",
     )
 
 

@@ -44,7 +44,7 @@ class RegionWeight(StrictMapping):
     """How much a region of the skin counts."""
 
     skin: Selector = Option(description="box, half_space, facing, faces, at, kind: skin of the region")
-    weight: float = Option(ge=0, le=1000, description="against 1 of skin in no region; 0: it does not count")
+    weight: float = Option(ge=0, le=1000, description="relative to 1 outside all regions; 0: ignored")
 
 
 class Constrained(Align):
@@ -65,7 +65,9 @@ class Constrained(Align):
     about: Vector | None = Option(
         None, description="point of the turns, in part coordinates, in the job's unit; default: middle of the bounds"
     )
-    weights: tuple[RegionWeight, ...] = Option((), description="regions that count more or less; the last one counts")
+    weights: tuple[RegionWeight, ...] = Option(
+        (), description="regions with another weight; the last one that matches applies"
+    )
     max_distance: float | None = Option(
         None,
         gt=0,
@@ -111,7 +113,7 @@ class Constrained(Align):
         on = np.abs(distance) <= tolerance
         if on.mean() < ON_PART:
             raise StageError(
-                f"in the best pose by the allowed motions {on.mean():.0%} of the scan lies on the part within the "
+                f"with the allowed motions, at best {on.mean():.0%} of the scan lies on the part within the "
                 f"tolerance of {tolerance:.4g} {part.unit}",
                 "allow more motions, give a closer T_part_scan, or use align: register",
             )

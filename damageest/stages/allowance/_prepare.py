@@ -44,7 +44,7 @@ class Prepare(Options):
 
     min_radius: float = Field(
         0.0, ge=0, allow_inf_nan=False,
-        description="radius of the cutter: what is narrower is widened to it, in the job's unit",
+        description="radius of the cutter: narrower places are widened to it, in the job's unit",
     )  # fmt: skip
     wall_angle: float = Field(
         20.0, ge=0, lt=80, description="least angle between a wall and the direction of the opening, in degrees"
@@ -55,7 +55,10 @@ class Prepare(Options):
         "where it ends no higher than the damage is deep",
     )
     depth: float = Field(
-        0.0, ge=0, allow_inf_nan=False, description="intact metal that is removed below the damage, in the job's unit"
+        0.0,
+        ge=0,
+        allow_inf_nan=False,
+        description="depth of intact metal to remove below the damage, in the job's unit",
     )
     direction: Vector | None = Field(
         None, description="[x, y, z] from which the cavity is milled and filled; default: the mean normal of the skin"
@@ -239,7 +242,7 @@ def _find_direction(damage: Solid, part: Part, prepare: Prepare) -> Floats:
     total, area = skin.sum(axis=0), float(np.linalg.norm(skin, axis=1).sum())
     if not area or np.linalg.norm(total) < OPEN * area:
         raise StageError(
-            "the skin of the damage faces no direction from which it could be opened, as where it goes through",
+            "the damaged skin has no common direction to open it from, for example where the damage goes through",
             "give prepare.direction",
         )
     return np.asarray(normalise(total[None])[0])

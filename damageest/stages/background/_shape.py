@@ -33,7 +33,7 @@ class ShapeBackground(Background, ABC):
     )
     subdivide: Subdivision = Field(
         "linear",
-        description="how it is refined to that edge: linear (edges into equal parts), adaptive (long edges halved), "
+        description="refinement to that edge: linear (edges into equal parts), adaptive (long edges halved), "
         "loop or butterfly (smoothing; not for shapes with sharp corners)",
     )
 
@@ -107,7 +107,7 @@ def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
     inner = np.concatenate([skin, surface.vertices])
     if outside := int((~is_inside(inner, background)).sum()):
         raise StageError(
-            f"the background does not hold part and damage surface: {outside} of {len(inner)} points lie outside it",
+            f"the background does not contain part and damage surface: {outside} of {len(inner)} points lie outside it",
             "subdivide: linear, background: minkowski",
             method="implicit",
         )

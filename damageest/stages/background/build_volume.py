@@ -43,7 +43,7 @@ class BuildVolume(Background):
         12.0,
         ge=6,
         le=1000,
-        description="how far round the site cells are made, in tolerances or point spacings, whichever is larger",
+        description="reach of the cells around the site, in tolerances or point spacings, whichever is larger",
     )
 
     def run(

@@ -66,7 +66,7 @@ def extend_outside(surface: Surface, rims: Rims, part: Part, width: float, toler
     if share > MOST_THROUGH:
         raise StageError(
             f"from its rim the damage surface reaches the skin only through metal (area: {share:.0%} of the surface)",
-            "a scan without gaps at the rim",
+            "scan the rim without gaps",
             method="implicit",
         )
     at = np.concatenate(places)

@@ -34,7 +34,7 @@ def join_room(lost: Any, left: Any, background: Solid, part: Part) -> Mesh:
 
     hold = to_manifold(background, origin)
     if not (lost ^ hold).volume() > 0:
-        raise StageError("the background holds none of the lost metal", "background: minkowski", method="implicit")
+        raise StageError("the background contains none of the lost metal", "background: minkowski", method="implicit")
     try:
         room = to_manifold(extract_contour(measure, low - cell, (nx, ny, nz), cell), origin)
     except StageError:  # narrower than the cells everywhere

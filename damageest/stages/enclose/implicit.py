@@ -28,11 +28,11 @@ class Implicit(EncloseAll):
         1.0,
         ge=0,
         le=10,
-        description="width of skin round the damaged points that does not hold the surface, in tolerances",
+        description="width of skin around the damaged points that does not constrain the surface, in tolerances",
     )
     push: float = Field(1.0, gt=0, le=4, description="how far the intact skin is moved outward, in tolerances")
     margin: float = Field(
-        8.0, ge=4, le=60, description="space round a loss in which the surface is solved, in tolerances"
+        8.0, ge=4, le=60, description="margin around a loss in which the surface is solved, in tolerances"
     )
     screening: float = Field(
         1.0, gt=0, le=100, description="weight of the points against the smoothness of the surface"
@@ -41,7 +41,7 @@ class Implicit(EncloseAll):
         0.03,
         ge=0,
         le=1,
-        description="about how far the surface may move for fewer triangles, in tolerances; 0: as the grid gives it",
+        description="largest movement of the surface by merging triangles, about, in tolerances; 0: no merging",
     )
     most_cells: int = Field(
         4_000_000, ge=50_000, le=60_000_000, description="most grid cells for one loss; a larger loss gets larger cells"

@@ -49,14 +49,13 @@ def map_to_nominal(result: Result, bodies: Mapping[str, Body]) -> Nominal:
     field = result.adapted.field
     if field is None:
         raise StageError(
-            "frame: nominal was asked for, but the part was adapted by a stage that gives no field to move solids "
-            "back by",
-            f"{REMEDY}, or a stage adapt that gives one, as adapt: smooth",
+            "frame: nominal is not possible: the stage adapt gives no displacement field to move solids back",
+            f"{REMEDY}, or a stage adapt that gives one, such as adapt: smooth",
         )
     try:
         return _map(result, bodies, field)
     except ArithmeticError as problem:
-        raise StageError(f"frame: nominal was asked for, but {problem}", REMEDY) from None
+        raise StageError(f"frame: nominal is not possible: {problem}", REMEDY) from None
 
 
 def _map(result: Result, bodies: Mapping[str, Body], field: DisplacementField) -> Nominal:

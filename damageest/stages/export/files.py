@@ -101,7 +101,7 @@ class Files(Export):
     path_header: JobPath | None = Field(
         None, description="file with the first lines of G-code, in which $title, $units, $offset and $site are replaced"
     )
-    path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, as path_header")
+    path_footer: JobPath | None = Field(None, description="file with the last lines of G-code, like path_header")
     path_options: Mapping[str, PathOption] = Field(
         {},
         description="for the writers of paths; rs274: on, off (default M3, M5), power (the S word), work_offset (G54), "
@@ -210,12 +210,14 @@ class Files(Export):
         if not result.part.cad_scale:
             if self.solids == "auto":
                 return ExportedFiles()
-            note = "solids: exact was asked for, but the part is a mesh without CAD faces; STEP solids have facets"
+            note = (
+                "solids: exact needs CAD faces: the part is a mesh, so STEP solids have facets; give the part as STEP"
+            )
             return ExportedFiles(notes=(note,), warnings=(note,))
         if result.adapted is not None and result.adapted.field is None:
             note = (
                 "STEP solids have facets, not the faces of the CAD file: the part was adapted to the scan by a stage "
-                "that gives no field to move them by; take adapt: smooth, or adapt: none"
+                "without a displacement field; take adapt: smooth, or adapt: none"
             )
             return ExportedFiles(notes=(note,), warnings=(note,))
         return writer(folder, result, bodies, places, self.limit, self.exact_seconds)

@@ -75,7 +75,7 @@ class ScanFile(ReadScan):
     scale: Literal["auto"] | None = Field(
         None,
         description="auto: where the scan is larger or smaller than the part, it is scaled by the factor that fits "
-        "best; default: a wrong scale is named and not corrected",
+        "best; default: a wrong scale is reported, not corrected",
     )
 
     min_confidence: FiniteFloat | None = Field(

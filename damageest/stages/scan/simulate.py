@@ -39,7 +39,7 @@ class Simulate(ReadScan):
         (), description="tools that are bodies beside the part, such as a fixture: scanned with it, and they hide it"
     )
     deform: Deformation | None = Field(
-        None, description="how the part with its damage is deformed before it is scanned; default: not"
+        None, description="deformation of the damaged part before the scan; default: none"
     )
     table: Table | None = Field(None, description="a plane plate that the part stands on; default: none")
     points: kinds.PositiveInt = Field(150_000, description="number of points, outliers included")
@@ -54,7 +54,7 @@ class Simulate(ReadScan):
         le=90,
         description="with `scanners`: no points where the angle between ray and surface normal is larger, in degrees",
     )
-    positions_known: bool = Field(True, description="whether the scan says where its scanners stood")
+    positions_known: bool = Field(True, description="whether the scan holds its scanner positions")
     noise: float | None = Field(
         None,
         ge=0,

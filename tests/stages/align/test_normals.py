@@ -46,7 +46,7 @@ def test_the_pose_does_not_depend_on_signs(outward: tuple[Part, Scan], kind: str
     signs = make_signs(kind, len(scan.points))
     pose = Register().run(replace(scan, normals=scan.normals * signs[:, None]), part, 4 * scan.noise)
     assert error(part, pose.T_part_scan, scan) < 0.5
-    told = [note for note in pose.notes if "normals in the file" in note]
+    told = [note for note in pose.notes if "scan's normals point" in note]
     assert len(told) == (kind != "right")
     if told:
         share = {"flipped": (95, 100), "random": (45, 55), "views": (35, 65)}[kind]
@@ -67,7 +67,7 @@ def test_a_run_with_flipped_normals_finds_the_damage_alone() -> None:
     result = damageest.run({"version": 1, "tolerance": 0.25, "allowance": "none"}, part=part, scan=flipped)
     assert len(result.sites) == 1
     assert not result.surplus
-    assert any("normals in the file" in note.text for note in result.warnings)
+    assert any("scan's normals point" in note.text for note in result.warnings)
 
 
 def test_a_scanner_position_vouches_for_normals() -> None:

@@ -98,7 +98,7 @@ def test_a_shoulder_over_the_opening_is_removed_and_a_wall_stays(height: float, 
 @pytest.mark.slow
 def test_a_hole_through_the_part_asks_for_a_direction() -> None:
     hole = Manifold.cylinder(60, 5, 5, 48, True)
-    with pytest.raises(StageError, match="faces no direction"):
+    with pytest.raises(StageError, match="no common direction"):
         prepare(hole)
     _, cavity, _ = prepare(hole, direction=(0.0, 0.0, 1.0), wall_angle=20)
     assert measure_area(cavity, -0.5) > measure_area(cavity, -19.5) > np.pi * 24

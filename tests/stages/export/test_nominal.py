@@ -159,7 +159,7 @@ def test_a_part_as_designed_has_the_same_files(drawn: tuple[Result, Result], tmp
 def test_without_a_field_the_message_says_what_to_do(drawn: tuple[Result, Result], tmp_path: Path) -> None:
     assert drawn[1].adapted is not None
     blind = replace(drawn[1], adapted=replace(drawn[1].adapted, field=None))
-    with pytest.raises(StageError, match="no field") as told:
+    with pytest.raises(StageError, match="no displacement field") as told:
         write(blind, tmp_path, frame="nominal")
     assert "frame: part" in told.value.remedy
 
