@@ -110,7 +110,7 @@ def _observed(registry: Registry, teller: Teller | None) -> Iterator[None]:
 def list_settings(settings: Sequence[str] | Mapping[str, Any]) -> Sequence[str]:
     """Overrides as the command line takes them. Raises InputError for a text, whose letters they would be."""
     if isinstance(settings, str):
-        raise InputError(f'settings: give a list, as [{settings!r}], or a mapping, as {{"tolerance": 0.2}}')
+        raise InputError(f'settings: give a list, [{settings!r}], or a mapping, for example {{"tolerance": 0.2}}')
     if not isinstance(settings, Mapping):
         return settings
     return [f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in settings.items()]

@@ -50,7 +50,7 @@ ERROR_CODES: dict[str, ErrorCode] = {
     "input": ErrorCode(
         "a given file, folder, array or value cannot be used",
         2,
-        "Do what the message says.",
+        "Follow the message.",
         "docs/your-own-scan.md",
     ),
     "cancelled": ErrorCode(

@@ -225,7 +225,9 @@ def describe_shortage(error: BaseException) -> StageError | None:
         return StageError("ran out of memory", MORE_MEMORY, code="memory")
     if isinstance(error, SystemError) and "without" in str(error) and "exception" in str(error):
         # Python's words for native code that fails and sets no exception
-        return StageError("a library failed and did not say why, as where memory ran out", MORE_MEMORY, code="memory")
+        return StageError(
+            "a library failed without a reason, as it may when memory runs out", MORE_MEMORY, code="memory"
+        )
     if isinstance(error, RuntimeError) and "can't start new thread" in str(error):
         return StageError(
             "no thread can be started: memory, or the number of processes, is at its limit",

@@ -17,8 +17,8 @@ OUTCOMES = {
     "failed": "a stage failed or refused",
     "refused": "job or input not valid",
     "crashed": "its process ended",
-    "memory": "passed its memory limit",
-    "timeout": "passed its time limit",
+    "memory": "exceeded its memory limit",
+    "timeout": "exceeded its time limit",
     "lost": "two workers died with it, or the cluster ended",
 }
 LEVELS = ("proven", "likely", "doubtful")

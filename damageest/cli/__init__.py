@@ -101,7 +101,7 @@ def main() -> None:
     except SystemExit as end:
         failure = _streams.describe_failure()
         if failure and not end.code:
-            say(f"error: standard output cannot be written: {failure}; files that were written are whole", err=True)
+            say(f"error: standard output cannot be written: {failure}; written files are complete", err=True)
             end.code = 1
         note_status(end.code)
         raise

@@ -20,7 +20,7 @@ from damageest.errors import StageError
 from damageest.isolation import supervise as watching
 from damageest.isolation.supervise import IS_POSSIBLE, end_like_fork, supervise
 
-LATE = "note: the work is done, but a thread of a plugin or a library went on; its process was ended\n"
+LATE = "note: done; a thread of a plugin or library still ran, so its process was ended\n"
 BEGAN = time.perf_counter() - time.process_time()
 """About when this process began, on the clock of `time.perf_counter`: it has done nothing but work so far."""
 is_command = False

@@ -73,7 +73,7 @@ def print_table(result: Result, target: Path) -> None:
         )
         show(f"damage volume: {describe_volume(result.damage_volume, result.volume_95)} {unit}³{known}{whole}")
         if volumes := result.describe_volumes():
-            show(f"of it and beside it: {volumes}")
+            show(f"components: {volumes}")
     elif not result.failures:
         where = f"{_on_seen(result)}{qualify_nothing(result.warnings)}"
         show(f"no damage deeper than the tolerance of {result.tolerance:.4g} {unit} was found{where}")

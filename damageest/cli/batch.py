@@ -55,7 +55,7 @@ def command(
     as_json: AsJson = False,
     quiet: Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no table.")] = False,
 ) -> None:
-    """Run many jobs at once, each in a process of its own; one that fails is a row of the table, not an end.
+    """Run many jobs at once, each in its own process. A failing job does not stop the batch.
 
     Exit status 0: all jobs ran, whatever their verdicts; 1: some did not. After Ctrl-C the same command goes on.
     """

@@ -31,12 +31,12 @@ class StepName(StrEnum):
 def command(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of the run before the repair.")],
     scan: Annotated[Path, typer.Argument(metavar="SCAN", help="Scan of the part after the step.")],
-    step: Annotated[StepName, typer.Option("--step", help="What was done before this scan.")],
+    step: Annotated[StepName, typer.Option("--step", help="Repair step before this scan.")],
     tolerance: Annotated[
         float | None, typer.Option("--tolerance", help="Allowed deviation, in the job's unit; default: the job's.")
     ] = None,
     same_setup: Annotated[
-        bool, typer.Option("--same-setup", help="The part was not moved since the scan before: take its pose.")
+        bool, typer.Option("--same-setup", help="Use the pose of the previous scan: the part was not moved.")
     ] = False,
     defect: Annotated[
         float | None,
@@ -46,25 +46,26 @@ def command(
     ] = None,
     elsewhere: Annotated[
         ElsewhereName | None,
-        typer.Option("--elsewhere", help="Whether findings at no site decide on the part; default: as the job says."),
+        typer.Option(
+            "--elsewhere", help="Whether findings outside all sites make the part not met; default: the job's."
+        ),
     ] = None,
     scan_unit: Annotated[
         str | None, typer.Option("--scan-unit", help="Unit of the scan's file; default: that of the job's scan.")
     ] = None,
     part_temperature: Annotated[
         float | None,
-        typer.Option("--part-temperature", help="Of the part at this scan, in °C; default: as in the job."),
+        typer.Option("--part-temperature", help="Temperature of the part at this scan, in °C; default: the job's."),
     ] = None,
     fixture: Annotated[
         list[str] | None,
-        typer.Option(
-            "--fixture", metavar="X,Y,Z,X,Y,Z", help="A box in which points are a fixture's. May be repeated."
-        ),
+        typer.Option("--fixture", metavar="X,Y,Z,X,Y,Z", help="Box around a fixture. May be repeated."),
     ] = None,
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Say what is missing and what is over after a step of a repair, and add it to the record in OUT."""
+    """Compare a scan made after a repair step with its target: missing and excess metal. Adds the result to the record
+    in OUT."""
     asked: dict[str, Any] = {"tolerance": tolerance, "same_setup": same_setup, "defect": defect}
     asked |= {"scan_unit": scan_unit, "part_temperature": part_temperature}
     if elsewhere is not None:
@@ -81,7 +82,7 @@ def _read_box(text: str) -> dict[str, list[float]]:
     except ValueError:
         values = []
     if len(values) != 6 or not all(low < high for low, high in zip(values[:3], values[3:], strict=True)):
-        text = f"a box is its lowest and its highest corner, as 0,0,0,10,10,5, not '{text}'"
+        text = f"give a box by its lowest and highest corner, for example 0,0,0,10,10,5, not '{text}'"
         raise JobError([Fault(text)], "--fixture")
     return {"min": values[:3], "max": values[3:]}
 
@@ -121,7 +122,7 @@ def _inspect(folder: Path, scan: Path, step: str, asked: dict[str, Any], fixture
     why = f": {found.whole.why}" if found.whole.why else ""
     say(f"part as a whole: {found.whole.outcome}{why}")
     for number in aim.refused:
-        say(f"note: site {number} was not to be repaired, and is not looked at")
+        say(f"note: site {number} has no accepted repair and is not inspected")
     for note in found.notes:
         say(f"note: {note}")
     record = append_inspection(aim, found, scan)

@@ -23,7 +23,7 @@ def command(
         list[Path], typer.Argument(metavar="OUT...", help="Output folders of runs that adapted the part, one a part.")
     ],
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="STL or PLY file to write; its form goes beside it, as .npz.")
+        Path, typer.Option("--output", "-o", help="STL or PLY file to write; its form goes beside it, in an .npz file.")
     ],
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:

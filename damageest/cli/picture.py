@@ -46,7 +46,9 @@ def command(
                 raise JobError([Fault(text)], option)
     numbers = re.fullmatch(r"(\d+)x(\d+)", size)
     if not numbers or not all(16 <= int(n) <= 8000 for n in numbers.groups()):
-        raise JobError([Fault(f"'{size}' is not a size; give width and height, 16 to 8000 each, as 900x700")], "--size")
+        raise JobError(
+            [Fault(f"'{size}' is not a size; give width and height, 16 to 8000 each, for example 900x700")], "--size"
+        )
     sites = site or [0] * len(folders)
     if len(sites) != len(folders):
         raise JobError([Fault(f"given {len(sites)} times for {len(folders)} folders; give one for each")], "--site")

@@ -27,8 +27,8 @@ def command(
         ),
     ] = SchemaName.job,
 ) -> None:
-    """Print the JSON Schema of the job file, with the options of all installed plugins, or of result.json, or the
-    tables of all reasons or errors."""
+    """Print the JSON Schema of job files, with the options of all installed plugins, or of result.json; or the tables
+    of reasons or errors."""
     from damageest.error_codes import format_errors
     from damageest.job.schema import job_schema
     from damageest.output.result_json import result_schema

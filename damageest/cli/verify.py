@@ -14,9 +14,7 @@ from damageest.cli._streams import say
 
 def command(
     folder: Annotated[Path, typer.Argument(metavar="OUT", help="Output folder of a run.")],
-    rerun: Annotated[
-        bool, typer.Option("--rerun", help="Run the job of result.json again, elsewhere, and compare.")
-    ] = False,
+    rerun: Annotated[bool, typer.Option("--rerun", help="Repeat the run in another folder and compare.")] = False,
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:

@@ -119,7 +119,7 @@ def _describe_holes(path: Path) -> str:
             written += at - start
     if written >= size / 2:
         return ""
-    return f"only {written} of its {size} bytes were ever written, as of a copy that did not end; copy the file again"
+    return f"only {written} of its {size} bytes were ever written, as by an interrupted copy; copy the file again"
 
 
 def resolve_path(path: Path, folder: Path) -> Path:
@@ -144,7 +144,7 @@ def check_output_file(path: Path, option: str) -> None:
     after it. Folders that are missing are made when it is written."""
     try:
         if path.is_dir():
-            raise _refuse(f"{path} is a folder; name a file, as {path / 'name'}{path.suffix}", option)
+            raise _refuse(f"{path} is a folder; name a file, for example {path / 'name'}{path.suffix}", option)
         if path.exists() and not path.is_file():
             raise _refuse(f"{path} is a pipe or a device; name a file", option)
         check_output_folder(path.parent, option)

@@ -105,7 +105,7 @@ def average_stacks(scan: Scan) -> tuple[Scan, tuple[str, ...]]:
     averaged = replace(scan.take(np.unique(label, return_index=True)[1]), points=means)
     note = (
         f"{len(scan.points):,} points lie in {len(count):,} stacks, up to {count.max()} points within {reach:.2g} "
-        f"{scan.unit} of each other, as of repeated exposures: each stack counts as one point, its mean"
+        f"{scan.unit} of each other, as from repeated exposures: each stack counts as one point, its mean"
     )
     return averaged, (note,)
 

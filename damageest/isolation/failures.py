@@ -62,7 +62,7 @@ def describe_signal(number: int) -> tuple[str, str]:
     """What a signal that ended a process means, and what to do where that is not for the authors of the code."""
     if number == getattr(signal, "SIGKILL", None):
         return (
-            "its process was killed (SIGKILL), as the system does where memory runs out",
+            "its process was killed (SIGKILL), probably for want of memory",
             "a larger tolerance, fewer scan points, or a --memory that the machine has",
         )
     return f"its process ended by {_SIGNALS.get(number, 'a signal')} ({signal.Signals(number).name})", ""

@@ -43,7 +43,7 @@ def parse_memory(text: str, option: str = "--memory") -> int:
     found = re.fullmatch(r"\s*([0-9]*\.?[0-9]+(?:e[0-9]+)?)\s*([KMGT]I?)?B?\s*", text, re.IGNORECASE)
     size = float(found[1]) * _UNITS[(found[2] or "").upper()] if found else math.nan
     if not 2**20 <= size < 2**60:
-        raise InputError(f"{option}: '{text}' is not valid; give a size of at least 1 MB, as 6GB or 500MB")
+        raise InputError(f"{option}: '{text}' is not valid; give a size of at least 1 MB, for example 6GB or 500MB")
     return int(size)
 
 

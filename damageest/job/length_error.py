@@ -73,7 +73,7 @@ def _read_product(tokens: list[str], at: int, text: str) -> tuple[LengthError, i
                 raise ValueError(f"'{text}' divides by 0")
             value = value * number if sign == "*" else value / number
         if power > 1:
-            raise ValueError(f"'{text}' is no constant plus a share of L, as 0.02 + L/20000")
+            raise ValueError(f"'{text}' is no constant plus a share of L, for example 0.02 + L/20000")
         if at == len(tokens) or tokens[at] == "+":
             return LengthError(0.0 if power else value, value if power else 0.0), at
         if tokens[at] not in "*/" and (tokens[at] != "L" or token == "L"):

@@ -38,11 +38,11 @@ class Box(Options):
 class SiteChoice(Options):
     """What a person decides about the sites, by their numbers in the table of a run without these decisions."""
 
-    drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites that are not damage")
+    drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites to drop")
     merge: tuple[tuple[PositiveInt, ...], ...] = Field(
-        (), description="lists of numbers of sites that are one; the site gets the lowest number"
+        (), description="lists of site numbers to merge; the merged site gets the lowest number"
     )
-    keep: Box | None = Field(None, description="only sites the middle of whose bounds is in this box; default: all")
+    keep: Box | None = Field(None, description="keeps only sites whose centre of bounds lies in this box; default: all")
 
 
 class InspectChoice(Options):
@@ -52,10 +52,10 @@ class InspectChoice(Options):
         None, gt=0, description="width of the least defect that matters, in the job's unit; default: 15 tolerances"
     )
     elsewhere: Literal["decides", "listed"] = Field(
-        "decides", description="what is found at no site makes the part not met (decides), or is only listed"
+        "decides", description="findings outside all sites make the part not met (decides), or are only listed"
     )
     fixtures: tuple[Box, ...] = Field(
-        (), description="boxes in which points are a fixture's; default: what touches a site counts as the part's"
+        (), description="boxes around fixtures; default: a body that touches a site counts as part of it"
     )
 
 
@@ -64,7 +64,7 @@ class Header(Options):
 
     version: Annotated[Literal[1], BeforeValidator(require_number)] = Field(description="version of the job format")
     name: str = Field("", pattern=r"^[^/\\\x00]*$", description="name of the job; default: the file's stem")
-    units: Unit = Field("mm", description="unit of every length in the job, and of files that carry none")
+    units: Unit = Field("mm", description="unit of every length in the job, and of files without a unit")
     tolerance: Annotated[float, Field(gt=0, allow_inf_nan=False)] | Literal["auto"] = Field(
         "auto",
         description="lambda, the threshold of accuracy, in the job's unit; auto: four times the scan's noise, "
@@ -85,14 +85,15 @@ class Header(Options):
         "beside those that are likely",
     )
     scanner: ScannerInfo | None = Field(
-        None, description="the scanner and its certificate, for the budget of uncertainty; default: not known"
+        None, description="the scanner and its certificate, for the budget of uncertainty; default: unknown"
     )
     temperature: Temperature | None = Field(
-        None, description="of the part at the scan: the scan is scaled to 20 °C; default: not known, no correction"
+        None,
+        description="temperature of the part at the scan: the scan is scaled to 20 °C; default: unknown, no correction",
     )
     inspect: InspectChoice | None = Field(
         None,
-        description="how scans after the repair are judged by `damageest inspect`; default: by the tolerance alone",
+        description="criteria of `damageest inspect` for scans after the repair; default: the tolerance alone",
     )
     output: Path | None = Field(None, description="output folder; default: out/<name>, beside the job file")
 

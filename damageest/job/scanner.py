@@ -34,7 +34,9 @@ class Certificate(Options):
         None, description="length measurement error: a number, or a constant plus a share of L; in the job's unit"
     )
     standard: str = Field(
-        "", max_length=80, description="their standard, for example ISO 10360-13, ISO 10360-8 or VDI/VDE 2634-3"
+        "",
+        max_length=80,
+        description="standard of the figures, for example ISO 10360-13, ISO 10360-8 or VDI/VDE 2634-3",
     )
     k: float | None = Field(
         None,
@@ -53,19 +55,19 @@ class ScannerInfo(Options):
     """The scanner that made the scan."""
 
     name: str = Field("", max_length=120, description="name and serial number for the report")
-    certificate: Certificate | None = Field(None, description="maximum permissible errors; default: not known")
+    certificate: Certificate | None = Field(None, description="maximum permissible errors; default: unknown")
 
 
 class Temperature(Options):
     """The temperature of the part when it was scanned: lengths are brought to 20 °C, at which drawings hold (ISO 1)."""
 
-    part: float = Field(ge=-270, le=2000, description="of the part at the scan, in °C")
-    uncertainty: float | None = Field(None, ge=0, description="of that temperature, in K; default: not known")
+    part: float = Field(ge=-270, le=2000, description="temperature of the part at the scan, in °C")
+    uncertainty: float | None = Field(None, ge=0, description="uncertainty of that temperature, in K; default: unknown")
     expansion: float = Field(
         ge=-1e-3, le=1e-3, description="coefficient of linear expansion of the material, in 1/K: steel about 11.5e-6"
     )
     expansion_uncertainty: float | None = Field(
-        None, ge=0, le=1e-3, description="of the coefficient, in 1/K; default: not known"
+        None, ge=0, le=1e-3, description="uncertainty of the coefficient, in 1/K; default: unknown"
     )
     k: float | None = Field(
         None,

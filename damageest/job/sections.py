@@ -16,14 +16,14 @@ class PlanePlace(StrictMapping):
     """A plane."""
 
     point: Vector = Field(description="a point on the plane, in part coordinates, in the job's unit")
-    normal: Direction = Field(description="its normal; its length does not matter")
+    normal: Direction = Field(description="normal of the plane; its length does not matter")
 
 
 class LinePlace(StrictMapping):
     """A straight line beside the skin; depth is measured on the skin nearest to it."""
 
-    start: Vector = Field(alias="from", description="its first end, in part coordinates, in the job's unit")
-    end: Vector = Field(alias="to", description="its other end, in part coordinates, in the job's unit")
+    start: Vector = Field(alias="from", description="first end of the line, in part coordinates, in the job's unit")
+    end: Vector = Field(alias="to", description="other end of the line, in part coordinates, in the job's unit")
 
     @model_validator(mode="after")
     def _check_length(self) -> Self:
@@ -47,25 +47,25 @@ class SectionChoice(StrictMapping):
     plane: PlanePlace | None = Field(None, description="any plane, by a point and its normal")
     along: Literal["axis", "x", "y", "z"] | Direction | None = Field(
         None,
-        description="several planes across this direction, equally far apart; axis: that of a turned part, else that "
-        "in which the part is longest",
+        description="evenly spaced planes across this direction; axis: that of a turned part, else the longest",
     )
-    count: int = Field(9, ge=1, le=200, description="how many planes `along` asks for")
+    count: int = Field(9, ge=1, le=200, description="number of planes of `along`")
     span: Annotated[tuple[FiniteFloat, FiniteFloat], AfterValidator(_check_order)] | None = Field(
         None,
         description="first and last plane of `along`, as coordinates along it in the part's frame, in the job's unit; "
-        "default: within the part, as far from its ends as from each other",
+        "default: evenly spaced within the part",
     )
     line: LinePlace | None = Field(None, description="depth of wear along a line instead of a section")
     kind: Literal["auto", "blade", "round", "contour"] = Field(
         "auto",
-        description="what is measured; blade: an aerofoil's chord, thickness, twist and bow; round: diameter, run-out "
-        "and roundness; contour: the deviation alone; auto: what the section as designed is",
+        description="quantities to measure; blade: an aerofoil's chord, thickness, twist and bow; round: "
+        "diameter, run-out and roundness; contour: the deviation alone; auto: by the section as "
+        "designed",
     )
     leading: Direction | None = Field(
-        None, description="where an aerofoil's leading edge is, seen from its middle; default: at its blunter end"
+        None, description="direction from an aerofoil's middle to its leading edge; default: to its blunter end"
     )
-    name: str = Field("", max_length=80, description="name of the section; default: its place")
+    name: str = Field("", max_length=80, description="name of the section; default: its position")
 
     @model_validator(mode="after")
     def _check_place(self) -> Self:

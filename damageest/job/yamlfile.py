@@ -29,7 +29,7 @@ def _read_text(path: Path) -> str:
     if path.is_dir():
         jobs = sorted(one.name for one in path.iterdir() if one.suffix in (".yaml", ".yml"))
         listed = ", ".join(jobs[:5]) + (", ..." if len(jobs) > 5 else "")
-        hint = f"name its job files, as {path / '*.yaml'}; it has {listed}" if jobs else "it has no .yaml file"
+        hint = f"name its job files, for example {path / '*.yaml'}; it has {listed}" if jobs else "it has no .yaml file"
         raise JobError([Fault(f"is a folder, not a job file; {hint}")], str(path))
     if path.exists() and not path.is_file():
         raise JobError([Fault("is not a regular file; a job is a YAML file on disk")], str(path))

@@ -22,12 +22,11 @@ PLACES = 4000
 class StiffModeReport(JsonModel):
     kind: Literal["scale", "stretch", "bend", "twist", "taper"]
     axis: str = Field(
-        description="x, y or z of the part's frame: along which it is longer, about which it turns, along which its "
-        "cross-sections grow, or which becomes an arc; empty for scale"
+        description="x, y or z of the part's frame: axis of a stretch, bend, twist or taper; empty for scale"
     )
-    toward: str = Field(description="of a bend, where the ends go; else empty")
+    toward: str = Field(description="direction to which the ends of a bend go; else empty")
     amount: float = Field(
-        description="largest displacement that it makes beyond a rigid motion; negative: the other way"
+        description="largest displacement by this mode beyond a rigid motion; negative: the other way"
     )
 
 
@@ -35,8 +34,8 @@ class HeldOutReport(JsonModel):
     """Cross-validation: the scan is cut into patches, half of which are held out of a fit to the others."""
 
     patches: int = Field(description="patches of the scan")
-    rigid: float = Field(description="root mean square of what the part as designed leaves in them, outliers limited")
-    adapted: float = Field(description="of what the field leaves")
+    rigid: float = Field(description="root mean square residual of the part as designed in them, outliers limited")
+    adapted: float = Field(description="the same residual of the adapted part")
 
 
 class ExtrapolationReport(JsonModel):
@@ -48,9 +47,9 @@ class ExtrapolationReport(JsonModel):
 class PriorReport(JsonModel):
     """What the job's other parts of the type said."""
 
-    used: bool = Field(description="whether lost skin was predicted from them; false: this part is none of them")
+    used: bool = Field(description="whether they predicted lost skin; false: this part deforms in another way")
     parts: int
-    misfit: float = Field(description="root mean square of what their forms leave on seen skin")
+    misfit: float = Field(description="root mean square residual of their forms on seen skin")
     limit: float = Field(description="largest misfit of a part of the type")
 
 
@@ -58,20 +57,20 @@ class AdaptReport(JsonModel):
     """How the part as designed was deformed. Sites, damage and coordinates are those of the deformed part."""
 
     amount: float = Field(description="largest displacement of the seen intact skin, without a rigid motion")
-    where: Vector | None = Field(description="its place on the deformed part; null where it is not known")
-    rms: float = Field(description="root of the mean square of the same")
-    growth: float = Field(description="uniform scale in it, less 1")
-    strain: float = Field(description="largest strain of the metal beyond that, without unit")
-    modes: list[StiffModeReport] = Field(description="what it is a sum of, the largest first")
-    left: float = Field(description="root mean square of what is none of these modes")
+    where: Vector | None = Field(description="position of the largest displacement on the deformed part; null: unknown")
+    rms: float = Field(description="root mean square displacement of the same skin")
+    growth: float = Field(description="uniform scale of the displacement, less 1")
+    strain: float = Field(description="largest strain of the metal beyond uniform scale, without unit")
+    modes: list[StiffModeReport] = Field(description="modes of the displacement, the largest first")
+    left: float = Field(description="root mean square displacement outside these modes")
     lattice: tuple[int, int, int] = Field(description="cells along the axes; 0, 0, 0: a cubic polynomial")
-    functions: int = Field(description="how many smooth functions each coordinate of the displacement is a sum of")
-    gain: float = Field(description="share by which it explains held-out patches of the scan better than a rigid part")
+    functions: int = Field(description="number of smooth functions for each coordinate of the displacement")
+    gain: float = Field(description="relative gain in the fit of held-out patches, against a rigid part")
     cross_validation: HeldOutReport
-    extrapolation: list[ExtrapolationReport] = Field(description="how the field goes on into each site")
+    extrapolation: list[ExtrapolationReport] = Field(description="extrapolation of the field into each site")
     prior: PriorReport | None = Field(description="null where no other parts of the type were given")
     motion: list[list[float]] = Field(
-        description="4x4, the rigid motion beside it, which is in alignment.transform too"
+        description="4x4, the rigid motion beside the deformation, contained in alignment.transform"
     )
 
 

@@ -24,8 +24,10 @@ class DeviationReport(JsonModel):
     """Signed distances of the scan points to the part's skin, positive outside."""
 
     labels: LabelReport
-    percentiles: dict[str, float] = Field(description="of the distance of all points, by percent")
-    intact_percentiles: dict[str, float] = Field(description="of the distance of the intact points, by percent")
+    percentiles: dict[str, float] = Field(description="percentiles of the distance of all points, by percent")
+    intact_percentiles: dict[str, float] = Field(
+        description="percentiles of the distance of the intact points, by percent"
+    )
 
 
 def report_deviation(deviation: Deviation) -> DeviationReport:

@@ -14,13 +14,13 @@ from damageest.output.base import JsonModel
 class PatchReport(JsonModel):
     size: float = Field(description="width of the patches of skin")
     deviation: float = Field(description="standard deviation of their mean distances from the part in the pose")
-    noise: float = Field(description="what the noise of their points explains of it")
-    left: float = Field(description="the same after the form that `model` names is undone")
+    noise: float = Field(description="share of it that the noise of their points explains")
+    left: float = Field(description="the same after removing the form that `model` names")
 
 
 class ScaleReport(JsonModel):
-    value: float = Field(description="length in the scan over length in the CAD, the one that fits best")
-    error: float = Field(description="its standard error")
+    value: float = Field(description="length in the scan over length in the CAD, best fit")
+    error: float = Field(description="standard error of the scale")
     axes: tuple[Vector, Vector, Vector] = Field(description="directions of by_axis, in the part's frame")
     by_axis: Vector
     by_axis_error: Vector
@@ -34,13 +34,13 @@ class DeformationReport(JsonModel):
 
 class ViewReport(JsonModel):
     number: int = Field(description="from 1 up, in the order of the scan's views")
-    shift: Vector = Field(description="of the part's centre, by which the view is corrected, in the part's frame")
-    turn: float = Field(description="in degrees, by which the view is corrected")
-    apart: float = Field(description="how far it lies from the other views where they overlap")
-    left: float = Field(description="the same after the views that fix their pose were corrected")
+    shift: Vector = Field(description="correction of the view: shift of the part's centre, in the part's frame")
+    turn: float = Field(description="correction of the view: turn in degrees")
+    apart: float = Field(description="distance from the other views where they overlap")
+    left: float = Field(description="the same distance after the correction of views with a fixed pose")
     is_determined: bool = Field(description="whether its points and the overlap fix its pose")
-    held: int = Field(description="how many of the six motions they leave free; these were held")
-    is_corrected: bool = Field(description="whether it was moved to its place")
+    held: int = Field(description="number of motions, of six, that they leave free; these were held")
+    is_corrected: bool = Field(description="whether the view was moved to its place")
 
 
 class FitReport(JsonModel):
@@ -52,16 +52,16 @@ class FitReport(JsonModel):
     scale: ScaleReport
     deformation: list[DeformationReport] = Field(description="empty where the model is not deformed")
     amount: float = Field(description="largest displacement of the seen skin by the model; 0 where it is ok")
-    amount_error: float = Field(description="its standard error")
+    amount_error: float = Field(description="standard error of the amount")
     views: list[ViewReport] = Field(description="empty where the views agree or are not known")
     views_from: Literal["given", "order", "sheets"] = Field(
-        description="what tells which points are a view: the scan; the order of the points, or two surfaces over the "
-        "same skin, which are looked for where the scan does not say it"
+        description="source of the assignment of points to views: the scan, the order of the points, or two "
+        "surfaces over the same skin"
     )
     views_hidden: float = Field(
         description="volume that may be worn off where only the part shows how corrected views were misplaced"
     )
-    waviness: float = Field(description="standard deviation of what no model explains, inside and outside alike")
+    waviness: float = Field(description="standard deviation that no model explains, inside and outside alike")
 
 
 def report_fit(fit: ModelFit | None) -> FitReport | None:

@@ -157,7 +157,7 @@ def open_output(folder: Path) -> OutputFolder:
     if not path.is_file():
         raise InputError(
             f"{folder}: there is no result.json, so this is not an output folder; name the folder that `damageest run` "
-            "wrote, as out/<name>",
+            "wrote, for example out/<name>",
             code="result_folder",
         )
     try:

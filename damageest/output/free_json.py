@@ -11,12 +11,14 @@ from damageest.output.base import JsonModel
 class FreeMotionReport(JsonModel):
     """One motion of the scan after which it fits as well."""
 
-    direction: Vector = Field(description="of a shift, or of the axis of a turn; unit vector in the part's frame")
-    point: Vector | None = Field(description="on the axis of a turn; null for a shift")
-    low: float = Field(
-        description="how far back, in the job's unit; of a turn: movement of the skin farthest from the axis"
+    direction: Vector = Field(
+        description="direction of a shift, or of the axis of a turn; unit vector in the part's frame"
     )
-    high: float = Field(description="how far forth")
+    point: Vector | None = Field(description="a point on the axis of a turn; null for a shift")
+    low: float = Field(
+        description="lower end of the motion, in the job's unit; of a turn: movement of the skin farthest from the axis"
+    )
+    high: float = Field(description="upper end of the motion, in the same")
     turn: float = Field(description="angle in radians for each unit of movement; 0 for a shift")
     text: str
 
@@ -24,21 +26,23 @@ class FreeMotionReport(JsonModel):
 class LeftMotionReport(JsonModel):
     """A motion that a datum system leaves free, and that the rest of the skin fixes."""
 
-    direction: Vector = Field(description="of a shift, or of the axis of a turn; unit vector in the part's frame")
-    point: Vector | None = Field(description="on the axis of a turn; null for a shift")
+    direction: Vector = Field(
+        description="direction of a shift, or of the axis of a turn; unit vector in the part's frame"
+    )
+    point: Vector | None = Field(description="a point on the axis of a turn; null for a shift")
     text: str
 
 
 class DatumReport(JsonModel):
     """How a datum of a datum system was fitted."""
 
-    name: str = Field(description="its letter")
-    kind: str = Field(description="its shape, as `plane`, or `3 cylinders` for a pattern")
+    name: str = Field(description="letter of the datum")
+    kind: str = Field(description="shape, for example `plane`, or `3 cylinders` for a pattern")
     faces: list[int] = Field(description="numbers of its CAD faces; empty where the part is a mesh")
-    takes: list[str] = Field(description="degrees of freedom that it fixes, those of datums before it left out")
+    takes: list[str] = Field(description="degrees of freedom that it fixes beyond earlier datums")
     points: int = Field(description="scan points on it")
     contact: float = Field(description="share of them on the fitted shape")
-    inside: float = Field(description="share of them below it, as where it is worn")
-    rms: float = Field(description="of the means of patches in contact, from the fitted shape")
+    inside: float = Field(description="share of them below the fitted shape, for example by wear")
+    rms: float = Field(description="root mean square distance of patches in contact from the fitted shape")
     nominal: list[float] = Field(description="radius of each cylinder and sphere, as designed")
-    measured: list[float] = Field(description="the same as fitted to the scan")
+    measured: list[float] = Field(description="radius of each as fitted to the scan")

@@ -29,7 +29,7 @@ def describe_failure(error: Exception, what: str = "the picture could not be dra
     if GRAPHICS_LIBRARY.match(find_missing_library(error)):
         return StageError(f"{what}: this machine has no OpenGL ({error})", INSTALL_GRAPHICS, code="missing")
     if isinstance(error, ProcessError) and error.why == "crash" and "SIGKILL" not in error.message:
-        text = f"{what}: {error.message}, as where a machine has no OpenGL or its graphics driver fails"
+        text = f"{what}: {error.message}, as on a machine without OpenGL or with a failing graphics driver"
         return StageError(text, INSTALL_GRAPHICS, code="missing")
     if isinstance(error, DamageestError):
         return error

@@ -20,11 +20,11 @@ class BeadFillReport(JsonModel):
 
     voxel: float = Field(description="edge of the voxels")
     filled: float = Field(description="share of the reachable deposit that beads fill")
-    gap: float = Field(description="volume of the reachable deposit that they do not fill")
+    gap: float = Field(description="volume of the reachable deposit without beads")
     largest_gap: float = Field(description="volume of its largest connected piece")
     void: float = Field(description="diameter of the largest ball in it")
     spill: float = Field(description="volume of beads outside the deposit and the metal")
-    spill_distance: float = Field(description="how far beads reach out of the deposit, beside metal")
+    spill_distance: float = Field(description="largest distance of beads from deposit and metal")
     sunk: float = Field(description="volume of beads where metal is already")
     of_deposit: float = Field(
         description="share of the whole deposit that beads fill: 1 without the shares of `unreachable_volume` and "
@@ -42,21 +42,23 @@ class PathReport(JsonModel):
         "empty: not known"
     )
     directions: list[Vector] = Field(description="build direction of each part of the deposit")
-    layer_heights: list[float] = Field(description="of each part of the deposit")
-    length: float = Field(description="of all passes")
+    layer_heights: list[float] = Field(description="height of the layers in each part of the deposit")
+    length: float = Field(description="length of all passes")
     travel: float = Field(description="length of the moves between them")
     minutes: float
-    wait_minutes: float = Field(description="of these, waits for neighbouring beads to cool down")
+    wait_minutes: float = Field(
+        description="share of `minutes` in which the tool waits for neighbouring beads to cool down"
+    )
     bead_volume: float = Field(description="volume that the passes add: length by section, that of the beads as laid")
     deposit_volume: float
-    surplus_volume: float = Field(description="volume that the passes add beyond what of the deposit is reached")
-    unreachable_volume: float = Field(description="of the deposit that no pass fills")
-    unreached: list[UnreachedReport] = Field(description="the same by reason")
+    surplus_volume: float = Field(description="volume that the passes add beyond the reached deposit")
+    unreachable_volume: float = Field(description="volume of the deposit that no pass fills")
+    unreached: list[UnreachedReport] = Field(description="that volume by reason")
     clearance: Bound = Field(
         description="least distance of the nozzle from metal, earlier deposits, fixture and layers below during "
         "deposition; null: none is near"
     )
-    travel_clearance: Bound = Field(description="the same between passes")
+    travel_clearance: Bound = Field(description="the same least distance between passes")
     setup: list[list[float]] | None = Field(
         description="with 3 axes: transform (4 rows) of a point of the part's frame to the frame in which the part is "
         "set up, z along the tool; the path's files are in that frame. Null: they are in the part's frame"

@@ -39,7 +39,7 @@ class ProvenanceReport(JsonModel):
     packages: dict[str, str] = Field(description="versions of the packages that provide stages, and of all they need")
     sources: dict[str, str] = Field(description="SHA-256 of the source code of the packages that provide stages")
     system: str = Field(description="system, processor and Python")
-    sha256: str = Field(description="of this file's content without this value, the stages and the steps")
+    sha256: str = Field(description="SHA-256 of this file's content without this value, the stages and the steps")
 
 
 def build_provenance(job: Job, folder: Path, target: Path) -> dict[str, Any]:

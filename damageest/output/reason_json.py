@@ -14,8 +14,8 @@ class ReasonReport(JsonModel):
         description="contradicts: the site is doubtful; open: something could not be seen, without an amount the upper "
         "end of the interval is open; widens: a term of the interval; note: changes no verdict"
     )
-    amount: float | None = Field(description="its size; null where it has none")
-    unit: str = Field(description="of the amount; empty for a share or a number")
+    amount: float | None = Field(description="size of the finding; null: none")
+    unit: str = Field(description="unit of the amount; empty for a share or a number")
     place: Vector | None = Field(description="where, in the part's frame; null where it has no place")
-    text: str = Field(description="what was found; its words may change from version to version")
-    remedy: str = Field(description="what to do about it; empty where nothing helps")
+    text: str = Field(description="the finding in a sentence; the wording may change from version to version")
+    remedy: str = Field(description="what to do; empty where nothing helps")

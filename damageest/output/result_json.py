@@ -31,7 +31,7 @@ class PartReport(JsonModel):
     volume: float
     watertight: bool
     tessellation_error: float = Field(description="bound on the distance between CAD surface and triangles")
-    notes: list[str] = Field(description="what was repaired or converted when the part was read")
+    notes: list[str] = Field(description="repairs and conversions at reading")
 
 
 class NoiseLevelReport(JsonModel):
@@ -42,7 +42,7 @@ class NoiseLevelReport(JsonModel):
 
 
 class VariogramReport(JsonModel):
-    distance: float = Field(description="between two intact points, mean of a range")
+    distance: float = Field(description="distance between two intact points, mean of a range")
     semivariance: float = Field(description="half the mean square by which their errors differ")
 
 
@@ -57,7 +57,7 @@ class SensorReport(JsonModel):
     least_depth: float = Field(description="shallower losses cannot be seen in this scan")
     least_width: float = Field(description="narrower losses cannot be seen in this scan")
     levels: list[NoiseLevelReport] = Field(description="empty where no scanner position is known")
-    semivariogram: list[VariogramReport] = Field(description="how alike errors are, by distance, nearest first")
+    semivariogram: list[VariogramReport] = Field(description="correlation of errors by distance, nearest first")
 
 
 class ScanReport(JsonModel):
@@ -70,27 +70,27 @@ class ScanReport(JsonModel):
 
 
 class RescaledReport(JsonModel):
-    factor: float = Field(description="what the lengths of the scan were divided by, for temperature and scale")
+    factor: float = Field(description="divisor of the scan's lengths, for temperature and scale")
     centre: Vector = Field(description="the place in the scanner's frame about which they were, which stays")
 
 
 class AlignmentReport(JsonModel):
     transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
-    quaternion: tuple[float, float, float, float] = Field(description="its rotation: w, x, y, z; w is not negative")
-    translation: Vector = Field(description="its shift, after the rotation")
-    rms: float = Field(description="of the inliers' distance to the part")
+    quaternion: tuple[float, float, float, float] = Field(
+        description="rotation as a quaternion: w, x, y, z; w is not negative"
+    )
+    translation: Vector = Field(description="shift, after the rotation")
+    rms: float = Field(description="root mean square distance of the inliers to the part")
     inliers: float = Field(description="share of the scan's points")
-    alternatives: list[list[list[float]]] = Field(description="other poses that fit as well, as on a symmetric part")
+    alternatives: list[list[list[float]]] = Field(
+        description="other poses that fit as well, for example on a symmetric part"
+    )
     notes: list[str]
     doubts: list[ReasonReport] = Field(description="reasons against the pose, and so against every site")
-    free: list[FreeMotionReport] = Field(
-        description="motions after which the scan fits as well, since no unworn skin holds it"
-    )
-    datums: list[DatumReport] = Field(description="of a datum system, in the order of precedence; else empty")
-    left: list[LeftMotionReport] = Field(
-        description="motions that the datum system leaves free, and that the rest of the skin fixes"
-    )
-    held: bool = Field(description="whether unworn skin holds the pose, but for these motions")
+    free: list[FreeMotionReport] = Field(description="motions that no unworn skin fixes")
+    datums: list[DatumReport] = Field(description="datums of a datum system, in the order of precedence; else empty")
+    left: list[LeftMotionReport] = Field(description="motions that the datum system leaves free, fixed by other skin")
+    held: bool = Field(description="whether unworn skin fixes all other motions")
     rescaled: RescaledReport | None = Field(
         None,
         description="only where the lengths of the scan were corrected: a raw point x is at "
@@ -103,7 +103,7 @@ class ExportReport(JsonModel):
         description="all that were written, in the part's frame, which is that of the adapted part where adapt is not "
         "null; those below scan_frame/ are in the scan's frame, those below nominal_frame/ on the part as designed"
     )
-    notes: list[str] = Field(description="what differs from what the job asks for, and why")
+    notes: list[str] = Field(description="differences from the job, with the reason")
 
 
 class TruthReport(JsonModel):
@@ -145,8 +145,8 @@ class Report(JsonModel):
     adapt: AdaptReport | None = Field(description="null where the part is as designed")
     fit: FitReport | None = Field(description="null where too few points lie near the skin")
     sites: list[SiteReport]
-    surplus: list[SurplusReport] = Field(description="what lies outside the nominal surface, surroundings last")
-    sections: list[SectionReport] = Field(description="those that the job asks for")
+    surplus: list[SurplusReport] = Field(description="bodies outside the nominal surface, surroundings last")
+    sections: list[SectionReport] = Field(description="sections of the job")
     export: ExportReport
     damage_volume: float
     volume_95: ReportedInterval | None = Field(
@@ -155,15 +155,15 @@ class Report(JsonModel):
     budget: BudgetReport | None = Field(
         description="budget of uncertainty of `damage_volume` (JCGM 100); null where there is no interval or no site"
     )
-    not_in_budget: list[str] = Field(description="sources that the job does not tell: they are in no interval")
+    not_in_budget: list[str] = Field(description="sources that the job does not give: not included in any interval")
     certificate: str = Field(description="scanner and standard of its certificate; empty where the job has none")
     undamaged_volume: float
-    material: MaterialReport = Field(description="what the whole repair takes")
+    material: MaterialReport = Field(description="material of the whole repair")
     truth: TruthReport | None
     stages: list[StageReport]
-    steps: list[StepReport] = Field(description="between the stages, up to the report")
+    steps: list[StepReport] = Field(description="steps between the stages, up to the report")
     failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
-    warnings: list[ReasonReport] = Field(description="about the whole run, those first that may change a decision")
+    warnings: list[ReasonReport] = Field(description="notes on the whole run, most important first")
     versions: dict[str, str]
     provenance: ProvenanceReport | None = Field(None, description="null in a result that is not in files")
 

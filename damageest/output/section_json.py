@@ -15,12 +15,12 @@ class SectionValueReport(JsonModel):
     """One quantity of a section."""
 
     name: str
-    nominal: float | None = Field(description="as designed")
-    measured: float | None = Field(description="as scanned; null where the scan does not show it")
+    nominal: float | None = Field(description="value as designed")
+    measured: float | None = Field(description="value as scanned; null where the scan does not show it")
     difference: float | None = Field(description="measured less nominal")
     error: float = Field(description="standard uncertainty of `measured`")
     unit: Literal["length", "degrees"] = Field(description="length: the job's unit")
-    note: str = Field(description="why it was not measured, or what it holds for; else empty")
+    note: str = Field(description="why there is no value, or its range of validity; else empty")
 
 
 class SectionReport(JsonModel):
@@ -39,7 +39,7 @@ class SectionReport(JsonModel):
     points: int
     values: list[SectionValueReport]
     notes: list[str]
-    files: list[str] = Field(description="its stations as a table, and its drawing")
+    files: list[str] = Field(description="files: its stations as a table, and its drawing")
 
 
 def report_section(section: Section, written: ExportedFiles) -> SectionReport:

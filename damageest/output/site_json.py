@@ -46,7 +46,7 @@ class FilesReport(JsonModel):
 class SplineReport(JsonModel):
     deviation: float | None = Field(description="largest distance between surface and spline, either way")
     trimmed: bool = Field(description="whether it ends at the surface's rim; otherwise it reaches beyond")
-    reason: str = Field(description="why none was written; empty where one was")
+    reason: str = Field(description="why there is no spline; empty where there is one")
 
 
 class ExactDepositReport(JsonModel):
@@ -60,22 +60,22 @@ class ExactDepositReport(JsonModel):
         "near to the mesh's, both ways, with stock as high as the mesh's"
     )
     farthest: float | None = Field(description="largest distance between them, both ways")
-    seconds: float = Field(description="of the processor")
+    seconds: float = Field(description="processor time")
     reason: str = Field(description="why it has facets; empty where it has CAD faces")
 
 
 class ExactMilledReport(JsonModel):
     """Whether the metal that is milled off before deposition has the CAD's own faces in STEP."""
 
-    form: str = Field(description="of the surface that milling leaves, as that of the damage volume; none: facets")
+    form: str = Field(description="form of the milled surface, as that of the damage volume; none: facets")
     faces: int
     prepared_faces: int = Field(description="faces that milling leaves")
     volume: float | None
     distance: float | None = Field(description="95 % of the surface that milling leaves are as near to the mesh's")
     farthest: float | None = Field(description="largest distance of these surfaces, both ways")
     beyond: float | None = Field(description="share of that surface farther than a quarter of the tolerance")
-    seconds: float = Field(description="of the processor")
-    tried: list[str] = Field(description="what was refused before for the opened cavity, and why")
+    seconds: float = Field(description="processor time")
+    tried: list[str] = Field(description="forms refused before for the opened cavity, with reasons")
     reason: str = Field(description="why it has facets; empty where it has CAD faces")
 
 
@@ -83,8 +83,8 @@ class ExactReport(JsonModel):
     """Whether the solid in STEP has the CAD's own faces."""
 
     form: str = Field(
-        description="of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside facets), "
-        "facets; none: facets all over"
+        description="form of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside "
+        "facets), facets; none: facets all over"
     )
     faces: int
     inner_faces: int = Field(description="faces inside the part")
@@ -92,8 +92,8 @@ class ExactReport(JsonModel):
     distance: float | None = Field(description="95 % of the inner surface are as near to the mesh's, both ways")
     farthest: float | None = Field(description="largest distance of the inner surfaces, both ways")
     beyond: float | None = Field(description="share of the inner surface farther than a quarter of the tolerance")
-    seconds: float = Field(description="of the processor")
-    tried: list[str] = Field(description="what was refused before, and why")
+    seconds: float = Field(description="processor time")
+    tried: list[str] = Field(description="forms refused before, with reasons")
     deposit: ExactDepositReport | None = Field(description="null where there is none beside the damage volume")
     milled: ExactMilledReport | None = Field(description="null where the cavity was not opened before deposition")
 
@@ -107,12 +107,12 @@ class ThicknessReport(JsonModel):
 
 
 class DepositReport(JsonModel):
-    volume: float = Field(description="of what is to be deposited")
-    stock_volume: float = Field(description="of its share beyond the nominal surface, to be milled off")
+    volume: float = Field(description="volume to deposit")
+    stock_volume: float = Field(description="volume of the deposit beyond the nominal surface, to be milled off")
     cut_back_volume: float = Field(
-        description="of intact metal to be removed before, for a clean surface or an open cavity"
+        description="volume of intact metal to remove before, for a clean surface or an open cavity"
     )
-    thickness: ThicknessReport | None = Field(description="of the stock; null where none was asked for or measured")
+    thickness: ThicknessReport | None = Field(description="thickness of the stock; null: no stock, or not measured")
     faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
 
 
@@ -127,14 +127,14 @@ class MaterialReport(JsonModel):
 class SiteReport(JsonModel):
     id: int
     points: int
-    volume: float = Field(description="of the damage volume, enlarged by the cut-back where there is one")
+    volume: float = Field(description="damage volume, enlarged by the cut-back if there is one")
     volume_95: ReportedInterval | None = Field(
         description="95 % interval of `volume`, its high end null where nothing limits it; null where there is none"
     )
     depth_95: ReportedInterval | None = Field(description="95 % interval of the largest depth, before a cut-back")
     uncertainty: UncertaintyReport | None
-    surface_area: float = Field(description="of the inner damage surface")
-    max_depth: float = Field(description="of the scan below the lost skin")
+    surface_area: float = Field(description="area of the inner damage surface")
+    max_depth: float = Field(description="largest depth of the scan below the lost skin")
     volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
     centroid: Vector
     bounds: tuple[Vector, Vector]
@@ -152,7 +152,7 @@ class SiteReport(JsonModel):
     files: FilesReport
     spline: SplineReport | None = Field(description="null where the job asks for none")
     exact: ExactReport | None = Field(description="null where no STEP is asked for, or the part has no CAD faces")
-    warnings: list[ReasonReport] = Field(description="what stages said about it; they change no verdict")
+    warnings: list[ReasonReport] = Field(description="notes of stages on the site; they change no verdict")
 
 
 def index_files(files: Iterable[str]) -> dict[str, list[str]]:

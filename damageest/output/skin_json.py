@@ -19,7 +19,7 @@ class UnseenReport(JsonModel):
     centre: Vector
     bounds: tuple[Vector, Vector]
     faces: list[int] = Field(description="numbers of its CAD faces; empty without B-rep")
-    volume: float = Field(description="of the part behind it: the most that can be lost without a trace in the scan")
+    volume: float = Field(description="volume of the part behind it: the largest loss that the scan cannot exclude")
     why: Literal["unknown", "hidden", "outside", "no points", "earlier scan"] = Field(
         description="hidden: by the part itself; outside: of every view; no points: though a view shows its place; "
         "unknown: no scanner position is known; earlier scan: the part is one, which does not show it either"
@@ -40,13 +40,13 @@ class SurplusReport(JsonModel):
         "fixture, a table or a second specimen"
     )
     points: int
-    share: float = Field(description="of the scan's points")
+    share: float = Field(description="share of the scan's points")
     volume: float | None = Field(description="null where it does not close, and for surroundings")
-    estimate: float = Field(description="of the volume: area times mean height; 0 for surroundings")
+    estimate: float = Field(description="estimated volume: area times mean height; 0 for surroundings")
     height: float = Field(description="largest distance of its points from the nominal surface")
-    area: float = Field(description="of the skin that it covers")
-    centre: Vector = Field(description="of the bounds")
-    bounds: tuple[Vector, Vector] = Field(description="of the volume; of the points where there is none")
+    area: float = Field(description="area of the skin that it covers")
+    centre: Vector = Field(description="centre of the bounds")
+    bounds: tuple[Vector, Vector] = Field(description="bounds of the volume, else of the points")
     file: str | None = Field(description="the first one of the volume; null where there is none")
     beside: list[int] = Field(description="numbers of the sites beside it")
     notes: list[str]

@@ -14,15 +14,15 @@ ReportedInterval = tuple[float, Bound]
 class BudgetRowReport(JsonModel):
     """A source of uncertainty, in the terms of JCGM 100 (GUM)."""
 
-    source: str = Field(description="its name, which stays the same from version to version")
+    source: str = Field(description="name of the source, the same from version to version")
     text: str
     type: Literal["A", "B"] = Field(description="A: from this scan by statistics; B: from other knowledge")
     distribution: Literal["normal", "rectangular"]
     uncertainty: float = Field(description="standard uncertainty of the source, in `unit`")
-    unit: str = Field(description="empty for a share, as of a scale")
+    unit: str = Field(description="unit of the source; empty for a share, for example a scale")
     sensitivity: float = Field(description="change of the result for each unit of the source")
     contribution: float = Field(description="standard uncertainty of the result by this source")
-    share: float = Field(description="of the variance of the result, 0 to 1")
+    share: float = Field(description="share of the variance of the result, 0 to 1")
 
 
 class BudgetBoundReport(JsonModel):
@@ -39,16 +39,18 @@ class BudgetReport(JsonModel):
     combined: float = Field(description="combined standard uncertainty")
     k: float = Field(description="coverage factor, of 95 %")
     expanded: float = Field(description="expanded uncertainty: `k` times `combined`")
-    correction: float = Field(description="of the mean error: the middle of the interval is the value and this")
+    correction: float = Field(
+        description="correction by the mean error: the middle of the interval is the value plus this"
+    )
     bounds: list[BudgetBoundReport]
 
 
 class FadingReport(JsonModel):
     """Volumes of a shallow loss, counted only where it is deep enough."""
 
-    half: float = Field(description="where it is deeper than half the tolerance")
-    at: float = Field(description="where it is deeper than the tolerance")
-    twice: float = Field(description="where it is deeper than twice the tolerance")
+    half: float = Field(description="volume deeper than half the tolerance")
+    at: float = Field(description="volume deeper than the tolerance")
+    twice: float = Field(description="volume deeper than twice the tolerance")
     beyond: float = Field(description="lost beyond the rim of the site, shallower still; not part of `volume`")
 
 
@@ -58,20 +60,22 @@ class UncertaintyReport(JsonModel):
     `probing_form` and `scanner` are standard deviations again."""
 
     noise: float = Field(description="noise of the points on the inner surface")
-    spacing: float = Field(description="the surface between the points, above all beside the rim")
-    rim: float = Field(description="where the inner surface meets the skin")
+    spacing: float = Field(description="surface between the points, above all beside the rim")
+    rim: float = Field(description="line where the inner surface meets the skin")
     pose: float = Field(description="pose of the scan")
-    tessellation: float = Field(description="triangles in place of the CAD surface")
-    form: float = Field(description="skin that deviates over whole areas")
-    outward: float = Field(description="skin that lies as far outside the part")
-    views: float = Field(description="views that differ where they overlap")
-    adapt: float = Field(description="the field that the part was adapted by; 0 where it was not")
+    tessellation: float = Field(description="tessellation of the CAD surface")
+    form: float = Field(description="deviation of skin over whole areas")
+    outward: float = Field(description="skin as far outside the part")
+    views: float = Field(description="disagreement of overlapping views")
+    adapt: float = Field(description="adaptation of the part; 0: not adapted")
     extrapolated: float = Field(description="length, no deviation: how far that field goes on beyond intact skin here")
     free: tuple[float, float] = Field(description="least and largest change")
-    inside: float = Field(description="where no points show the inner surface")
-    beside: float = Field(description="where no points show the skin beside it")
+    inside: float = Field(description="inner surface without points")
+    beside: float = Field(description="unseen skin beside the site")
     probing_form: float = Field(description="probing form error of the scanner's certificate, beyond the noise")
-    scanner: float = Field(description="its other figures, and the temperature of the part")
-    budget: BudgetReport | None = Field(description="of the volume, source by source; null where nothing was measured")
-    depth_budget: BudgetReport | None = Field(description="of the largest depth")
-    fading: FadingReport | None = Field(description="of a loss that is shallow; null for one with a sharp rim")
+    scanner: float = Field(description="other figures of the certificate, and the temperature of the part")
+    budget: BudgetReport | None = Field(
+        description="budget of the volume, source by source; null where nothing was measured"
+    )
+    depth_budget: BudgetReport | None = Field(description="budget of the largest depth")
+    fading: FadingReport | None = Field(description="volumes of a shallow loss by counted depth; null for a sharp rim")

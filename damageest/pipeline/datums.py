@@ -40,7 +40,7 @@ def hold_datums(engine: Engine, state: JobState) -> tuple[Pose, Scan, Reasons]:
         again: Pose = engine.make_silent().call(Align, moved).get(Align.gives)
         settled = [note for note in state.warnings if note.code != "align"]
         return again, corrected.move(again.T_part_scan), [*settled, *make_notes("align", again.notes)]
-    text = "views were put right, and then the pose could not be fitted to the datums again"
+    text = "after the correction of views the pose could not be fitted to the datums"
     note = describe_moved(state.part, views.common, state.tolerance, state.unit, text, "fit_views: false of align")
     return pose, state.aligned, [*state.warnings, *note]
 
@@ -50,7 +50,7 @@ def note_datums(adapted: AdaptedPart | None, aligner: Align | None, part: Part, 
     """Warns where a pose by datums was moved to follow an adapted part."""
     if adapted is None or not has_datums(aligner):
         return ()
-    text = "the scan was moved onto the adapted part, to which all intact skin fixes it"
+    text = "the adaptation moved the scan"
     return describe_moved(part, adapted.motion, tolerance, unit, text, "adapt: none")
 
 

@@ -60,7 +60,7 @@ def refuse_bubbles(deposit: Solid | None, damage: Solid, part: Solid) -> None:
         place = ", ".join(f"{value:.4g}" for value in box)
         raise StageError(
             f"allowance: the deposit encloses an empty space of {largest.volume():.3g} in volume, near ({place})",
-            "another outer or overlap, or a keep_out that reaches out of the deposit",
+            "take another outer or overlap, or a keep_out that reaches out of the deposit",
         )
 
 

@@ -45,7 +45,7 @@ def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
     stage, usual = engine.job.stages[Sample], engine.registry.get(Sample.stage, DEFAULTS[Sample])
     if samples is not None or (stage.use == usual.name and stage == usual.cls.model_validate({})):
         return ()
-    return make_notes(Sample.stage, (f"sample: {stage.use} did not run, since no stage took its points",))
+    return make_notes(Sample.stage, (f"sample: {stage.use} did not run: no stage uses its points",))
 
 
 @step(gives="nearby")

@@ -60,8 +60,8 @@ def question_table(engine: Engine, state: JobState) -> tuple[Scan, Part, Pose, R
     with suppress(StageError):
         other = engine.make_silent().call(Align, alone).get(Align.gives)
     told = (
-        f"both scans show a table; in the pose that lays one table on the other {explained:.0%} of what stands on it "
-        "agrees with the earlier scan"
+        f"both scans show a table; with one table laid on the other, {explained:.0%} of the objects on it agree with "
+        "the earlier scan"
     )
     remedy = "crop the table away from both scans"
     better = 0.0 if other is None else _measure_explained(body.points, other, bare, reach)

@@ -246,7 +246,7 @@ def _read_rules(plugin: Any, known: Mapping[str, Rule], provider: Provider) -> d
         if provider.name != OWN and cls.code in RESERVED:
             raise PluginError(
                 f"its rule {cls.__qualname__} has the code '{cls.code}', which damageest gives itself; choose another, "
-                f"as {provider.name.removeprefix('damageest-').replace('-', '_')}_{cls.code}"
+                f"for example {provider.name.removeprefix('damageest-').replace('-', '_')}_{cls.code}"
             )
         rules[cls.code] = cls()
         rules[cls.code].owner = "" if provider.name == OWN else f"{provider}"

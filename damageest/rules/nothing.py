@@ -25,7 +25,7 @@ def is_nothing(volume: float, interval: Interval, certain: float) -> bool:
 
 class Nothing(Rule):
     code = "nothing"
-    meaning = "the interval reaches nearly nothing: the site may be no loss"
+    meaning = "the interval nearly reaches 0: the site may be no loss"
     threshold = (
         f"low end at most {NOTHING:.0%} of the volume, and no piece of {CERTAIN:.0%} of it lost in any case; or no "
         "interval"

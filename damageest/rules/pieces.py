@@ -15,7 +15,7 @@ such a site are than half of them."""
 
 class Pieces(Rule):
     code = "pieces"
-    meaning = "a piece of the site is certain, and an apron around it is not"
+    meaning = "a piece of the site is certain, the shallow rest around it is not"
     threshold = f"low end at most {APRON:.0%} of the volume, and 5 % of its points {UNEVEN:g} times deeper than half"
     remedy = "a larger tolerance keeps the certain piece alone"
 

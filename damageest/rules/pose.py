@@ -24,7 +24,7 @@ POSE_CODES = {
     "wrong_scale": "the scan fits far better in another scale",
     "datum_worn": "a datum is worn or misplaced",
     "datum_decides": "the datums decide between equally good poses",
-    "shared_table": "what stands on a table in both scans does not agree with the pose",
+    "shared_table": "objects on a table in both scans contradict the pose",
     "given_pose": "a nearby pose fits better than the given one",
 }
 """Codes of the reasons that implementations of align give against their pose."""

@@ -98,7 +98,7 @@ def test_a_crash_in_the_other_process_is_said_with_its_signal(
     folder: OutputFolder, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(pictures, "draw_here", abort)
-    with pytest.raises(StageError, match=r"ended by an abort \(SIGABRT\), as where a machine has no OpenGL"):
+    with pytest.raises(StageError, match=r"ended by an abort \(SIGABRT\), as on a machine without OpenGL"):
         draw_picture(Picture((folder,), (0,)), folder.folder / "picture.png")
     assert not (folder.folder / "picture.png").exists()
 

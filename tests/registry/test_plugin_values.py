@@ -268,7 +268,7 @@ def test_a_thread_that_a_plugin_leaves_does_not_keep_the_process(
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "out" / "job" / "result.json").read_text())["status"] == "ok"
     assert "written to" in done.stdout
-    assert "a thread of a plugin or a library went on; its process was ended" in done.stderr
+    assert "a thread of a plugin or library still ran, so its process was ended" in done.stderr
 
 
 @pytest.mark.slow

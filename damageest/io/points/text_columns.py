@@ -81,8 +81,8 @@ def _fit_names(table: Floats, names: list[str]) -> list[str]:
     if len(names) == width - 1 and _counts_rows(table[:, 0]):  # as R writes a table: row names have no name
         return ["_", *names]
     raise FormatError(
-        f"{len(names)} columns are named, but the rows have {width} columns; say with  scan.columns  what they are, "
-        "such as 'x y z _ nx ny nz'"
+        f"{len(names)} columns are named, but the rows have {width} columns; name them in  scan.columns,  "
+        "for example 'x y z _ nx ny nz'"
     )
 
 

@@ -53,7 +53,7 @@ def require_injective(field: Field, turn: Floats, places: Floats, largest: float
     steep = float(np.linalg.norm(gradient - np.eye(3), ord=2, axis=(1, 2)).max())
     if steep > STEEPEST or float(np.linalg.det(gradient).min()) <= 0:
         raise StageError(
-            f"the deformation that fits the scan would fold the part: gradient {steep:.2f}, at most {STEEPEST:g} is safe",
+            f"the deformation that fits the scan would fold the part: gradient {steep:.2f}, safe up to {STEEPEST:g}",
             REMEDY,
         )
 

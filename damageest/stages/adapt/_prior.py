@@ -139,7 +139,7 @@ def describe_prior(start: Start, tolerance: float, unit: str) -> str:
     if not used.is_used:
         return (
             f"the form of {parts} was not used: this part deforms in another way (residual {used.misfit:.3g} "
-            f"{unit} on its seen skin, usually up to {used.limit:.3g} {unit}); lost skin is predicted from its own seen skin"
+            f"{unit} on its seen skin, usually up to {used.limit:.3g} {unit}); its own skin alone predicts lost skin"
         )
     words = f"the form was predicted from {parts} (residual {used.misfit:.3g} {unit} on its seen skin)"
     if start.errors is None:

@@ -70,8 +70,8 @@ class Milling(Allowance):
     )
     crowded: Literal["refuse", "clip"] = Field(
         "refuse",
-        description="where stock would run into an opposite wall, close a bore or fill a gap: refuse the site, or "
-        "clip (the stock ends at the wall or fills the gap; a warning says where)",
+        description="stock that would run into an opposite wall, close a bore or fill a gap: refuse the site, or "
+        "clip (the stock ends at the wall or fills the gap; a warning names the place)",
     )
 
     def find_idle_region(self, selector: Selector, part: Part) -> str:

@@ -32,9 +32,7 @@ class Adaptive(Enclose):
     refines: ClassVar[bool] = True
 
     use: Literal["adaptive"] = "adaptive"
-    overhang: float = Field(
-        3.0, ge=0, le=20, description="how far the surface is extended beyond its rim, in tolerances"
-    )
+    overhang: float = Field(3.0, ge=0, le=20, description="extension of the surface beyond its rim, in tolerances")
     edge: float = Field(
         1.5,
         gt=0,

@@ -23,9 +23,7 @@ class Divide(Enclose):
     refines = True
 
     use: Literal["divide"] = "divide"
-    overhang: float = Field(
-        3.0, ge=0, le=20, description="how far the surface is extended beyond its rim, in tolerances"
-    )
+    overhang: float = Field(3.0, ge=0, le=20, description="extension of the surface beyond its rim, in tolerances")
     side: Side = Field(
         "auto",
         description="which side of the damage surface is lost: auto (the one without intact points), smaller or larger "

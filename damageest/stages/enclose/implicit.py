@@ -30,7 +30,7 @@ class Implicit(EncloseAll):
         le=10,
         description="width of skin around the damaged points that does not constrain the surface, in tolerances",
     )
-    push: float = Field(1.0, gt=0, le=4, description="how far the intact skin is moved outward, in tolerances")
+    push: float = Field(1.0, gt=0, le=4, description="outward offset of the intact skin, in tolerances")
     margin: float = Field(
         8.0, ge=4, le=60, description="margin around a loss in which the surface is solved, in tolerances"
     )

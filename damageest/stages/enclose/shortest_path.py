@@ -20,9 +20,7 @@ class ShortestPath(Enclose):
     """
 
     use: Literal["shortest_path"] = "shortest_path"
-    overhang: float = Field(
-        3.0, ge=0, le=20, description="how far the surface is extended beyond its rim, in tolerances"
-    )
+    overhang: float = Field(3.0, ge=0, le=20, description="extension of the surface beyond its rim, in tolerances")
 
     def run(
         self, surface: Surface, rims: Rims, background: Solid, part: Part, intact: Floats, tolerance: float

@@ -33,8 +33,8 @@ class EarlierScan(ReadPart):
     )
     viewpoint: tuple[FiniteFloat, FiniteFloat, FiniteFloat] | None = Field(
         None,
-        description="where the scanner stood for all points of a single file: [x, y, z] in the file's unit and frame; "
-        "default: what the file says",
+        description="scanner position for all points of a single file: [x, y, z] in the file's unit and frame; "
+        "default: the file's own",
     )
     cell: float | None = Field(
         None, gt=0, description="resolution, in the job's unit; default: from the spacing and noise of the scan"

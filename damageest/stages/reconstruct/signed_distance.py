@@ -31,8 +31,8 @@ class SignedDistance(Reconstruct):
         2.0,
         ge=1.5,
         le=8,
-        description="how far from a point the distance is computed, in cells; a larger radius bridges wider gaps, and "
-        "rounds what is more curved",
+        description="largest distance from a point at which the distance is computed, in cells; a larger radius "
+        "bridges wider gaps and rounds curved places",
     )
 
     def run(self, points: Floats, part: Part, tolerance: float, spacing: float, noise: float) -> Surface:

@@ -23,7 +23,7 @@ class DetachedPiece(Options):
 
     model_config = ConfigDict(defer_build=True)
     piece: AnyTool = Field(description="the piece: what of the part lies within this tool")
-    shift: Vector = Field((0.0, 0.0, 0.0), description="how far the piece is moved along x, y and z, in the job's unit")
+    shift: Vector = Field((0.0, 0.0, 0.0), description="shift of the piece along x, y and z, in the job's unit")
     rotation: Vector = Field(
         (0.0, 0.0, 0.0),
         description="rotation in degrees about the fixed x, then y, then z axis, about the centre of the piece's "
@@ -41,7 +41,7 @@ class Table(Options):
     margin: float = Field(
         0.25,
         ge=0,
-        description="how far the plate reaches beyond the part, in diagonals of the part",
+        description="width of the plate beyond the part, in diagonals of the part",
         allow_inf_nan=False,
     )
 

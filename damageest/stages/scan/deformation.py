@@ -37,7 +37,7 @@ class Deformation(Options):
     )
     free: FiniteFloat = Field(0.0, ge=0, description="amount of a smooth random displacement")
     cells: int = Field(3, ge=1, le=10, description="waves of `free` along the longest edge of the box")
-    seed: int = Field(0, ge=0, description="of `free`")
+    seed: int = Field(0, ge=0, description="seed of `free`")
     along: Direction | None = Field(None, description="direction of the axis; default: the longest edge of its box")
     toward: Direction | None = Field(
         None, description="direction that the ends are bent to; default: the shortest edge of its box"

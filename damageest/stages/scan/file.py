@@ -35,7 +35,7 @@ class ViewFile(Options):
     path: JobPath = Field(description="the file, relative to the job's folder")
     viewpoint: Vector | None = Field(
         None,
-        description="where the scanner stood: [x, y, z] in the file's unit and frame; default: what the file says",
+        description="scanner position: [x, y, z] in the file's unit and frame; default: the file's own",
     )
 
 
@@ -59,8 +59,8 @@ class ScanFile(ReadScan):
     )
     viewpoint: Vector | None = Field(
         None,
-        description="where the scanner stood for all points of a single file: [x, y, z] in the file's unit and frame; "
-        "default: what the file says",
+        description="scanner position for all points of a single file: [x, y, z] in the file's unit and frame; "
+        "default: the file's own",
     )
     unit: UnitOption | None = Field(
         None,
@@ -80,14 +80,14 @@ class ScanFile(ReadScan):
 
     min_confidence: FiniteFloat | None = Field(
         None,
-        description="points of a lower confidence (property or column confidence or quality) are set aside, on the "
-        "scale of the file; default: none is",
+        description="least confidence (property or column confidence or quality, on the file's scale) of used "
+        "points; default: all are used",
     )
     most_points: int = Field(
         4_000_000,
         ge=0,
-        description="of a larger file (PLY, NPY, LAS, LAZ, E57) about this many points are used, and all near damage; "
-        "0: all points, whatever memory they need",
+        description="number of points used of a larger file (PLY, NPY, LAS, LAZ, E57), about, with all points "
+        "near damage; 0: all points, at any cost of memory",
     )
 
     @model_validator(mode="after")

@@ -125,15 +125,15 @@ class Simulate(ReadScan):
     )
     sheet_offset: float = Field(
         0.0,
-        description="how far the sheets of `sheets` are from the skin, towards the scanner, in the job's unit; without "
-        "`scanners` outward; below 0: behind the skin",
+        description="distance of the sheets of `sheets` from the skin, towards the scanner, in the job's unit; "
+        "without `scanners` outward; below 0: behind the skin",
         allow_inf_nan=False,
     )
     patches: float = Field(0.0, ge=0, lt=1, description="share of the skin, in patches, without points (no texture)")
     patch_size: kinds.PositiveFloat | None = Field(
         None,
-        description="how far the patches of `patches` and `sheets` reach, about, in the job's unit; default: a tenth "
-        "of the part's diagonal",
+        description="size of the patches of `patches` and `sheets`, about, in the job's unit; default: a tenth of "
+        "the part's diagonal",
     )
     misplaced: float = Field(
         0.0,

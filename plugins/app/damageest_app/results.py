@@ -150,7 +150,7 @@ class Results:
             parts = [f"{one['volume']:.3g} {self.unit}³ {one['why']}" for one in path["unreached"]]
             extra = float(path.get("surplus_volume") or 0.0) / whole
             if extra > MUCH:
-                parts.append(f"the passes add {extra:.0%} more than what they reach")
+                parts.append(f"the passes add {extra:.0%} beyond the reached volume")
             if left > MUCH or parts:
                 text = f"site {site['id']}: {left:.1%} of the deposit is not filled"
                 found.append({"text": "; ".join([text, *parts]), "is_much": left > MUCH})

@@ -142,7 +142,7 @@ class Runner:
 def describe_end(outcome: Outcome, doing: str) -> str:
     """What a person reads where a run did not end well; empty where it did."""
     if outcome.stopped:
-        return f"stopped in {doing}; what was done is kept, and the next run continues after it"
+        return f"stopped in {doing}; finished stages are kept, and the next run continues there"
     if outcome.status == 0:
         return ""
     if outcome.messages:

@@ -257,7 +257,7 @@ def as_cadquery(result: Result, what: str, site: int | None = None) -> Any:
     if not result.part.cad_scale:
         raise InputError("the part is a mesh: only a part from STEP, IGES or BREP has CAD faces")
     if result.adapted is not None and result.adapted.field is None:
-        raise InputError(f"{NO_FIELD}; take as_trimesh, or a stage adapt that gives a field, as adapt: smooth")
+        raise InputError(f"{NO_FIELD}; take as_trimesh, or a stage adapt that gives a field, for example adapt: smooth")
     if what == "part" or (what == "undamaged" and not result.sites):
         if result.adapted is None:
             return _take_shape(Path(result.part.path), result.part.cad_scale)

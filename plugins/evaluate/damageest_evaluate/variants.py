@@ -85,7 +85,7 @@ def make_variants(request: VariationRequest, base: Baseline) -> list[Variant]:
         name, values = _parse_option(text, base)
         if name in axes:
             raise InputError(
-                f"--vary {text}: '{name}' is given twice; give all its values in one option, as {name}=a,b,c"
+                f"--vary {text}: '{name}' is given twice; give all its values in one option, for example {name}=a,b,c"
             )
         axes[name] = values
     return [
@@ -123,11 +123,15 @@ def _parse_lengths(option: str, text: str, unit: str, base: float, times: bool) 
     for word in filter(None, (word.strip() for word in text.split(","))):
         match = re.fullmatch(r"(\d*\.?\d+(?:[eE][+-]?\d+)?)\s*(\D*)", word)
         if not match:
-            raise InputError(f"{option}: '{word}' is not a length; give numbers separated by commas, as 0.5,2x,0.1mm")
+            raise InputError(
+                f"{option}: '{word}' is not a length; give numbers separated by commas, for example 0.5,2x,0.1mm"
+            )
         number, suffix = float(match[1]), match[2]
         if suffix == "x" or (times and not suffix):
             if number and not base:
-                raise InputError(f"{option}: '{word}' is a multiple of 0; give a length with its unit, as 0.01{unit}")
+                raise InputError(
+                    f"{option}: '{word}' is a multiple of 0; give a length with its unit, for example 0.01{unit}"
+                )
             number *= base
         elif suffix:
             number *= unit_factor(suffix, unit)
@@ -159,7 +163,7 @@ def _parse_counts(text: str) -> list[int]:
         values = [0]
     if any(count < 1 for count in values):
         raise InputError(
-            f"--points: '{text}' is not valid; give numbers of points separated by commas, as 20000,150000"
+            f"--points: '{text}' is not valid; give numbers of points separated by commas, for example 20000,150000"
         )
     return values
 

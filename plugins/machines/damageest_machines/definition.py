@@ -23,20 +23,22 @@ class Frame(Options):
     (Rz Ry Rx): c, b, a of KUKA, and w, p, r of Fanuc."""
 
     position: Vector = (0.0, 0.0, 0.0)
-    rotation: Vector = Field((0.0, 0.0, 0.0), description="about x, y, z of the other frame, in this order, in degrees")
+    rotation: Vector = Field(
+        (0.0, 0.0, 0.0), description="turns about x, y, z of the other frame, in this order, in degrees"
+    )
 
 
 class Work(Frame):
     """Where the work offset lies: in the machine's frame, or the robot's base, with all rotary axes at 0."""
 
-    name: str = Field("G54", description="the word of a control that calls it, as G54")
-    number: int = Field(1, ge=0, description="of a robot's base, work object or user frame")
+    name: str = Field("G54", description="work offset in the control's words, for example G54")
+    number: int = Field(1, ge=0, description="number of a robot's base, work object or user frame")
 
 
 class Tool(Frame):
     """The tip of the nozzle in the frame of the robot's flange, or of the machine's spindle nose."""
 
-    number: int = Field(1, ge=0, description="of the tool in the control")
+    number: int = Field(1, ge=0, description="number of the tool in the control")
     points: Pointing = Field(
         "z", description="which axis of the tool's frame points from the flange to the work; machine tools: -z"
     )
@@ -47,7 +49,7 @@ class Frames(Options):
     """``part`` lies in ``work``; ``work`` in the machine's frame; ``tool`` on the flange."""
 
     work: Work = Work()
-    part: Frame = Field(Frame(), description="the frame of the path's files in that of the work offset")
+    part: Frame = Field(Frame(), description="frame of the path's files in that of the work offset")
     tool: Tool = Tool()
 
 
@@ -63,11 +65,13 @@ class Linear(Options):
 class Rotary(Options):
     """A rotary axis: of a table or positioner, which carries the part, or of a head, which carries the tool."""
 
-    name: str = Field(pattern="^[A-Z][0-9]?$", description="as the control calls it: A, B, C, or E1 of a positioner")
+    name: str = Field(pattern="^[A-Z][0-9]?$", description="name in the control: A, B, C, or E1 of a positioner")
     carries: Literal["part", "tool"]
-    direction: Vector = Field(description="in the machine's frame, with all axes at 0; it turns by the right hand")
+    direction: Vector = Field(
+        description="direction of the axis in the machine's frame, with all axes at 0, by the right hand"
+    )
     point: Vector = Field((0.0, 0.0, 0.0), description="a point on the axis, with all axes at 0")
-    limits: Limits | None = Field(None, description="None: it turns without end")
+    limits: Limits | None = Field(None, description="limits in degrees; none: the axis turns without end")
     speed: Above = 90.0
     acceleration: Above = 180.0
 
@@ -86,9 +90,9 @@ class Robot(Options):
     """A robot. Its joints are left to its control, or to the hook damageest_kinematics."""
 
     reach: Reach
-    speed: Above = Field(250.0, description="of the tool along its path, at most")
+    speed: Above = Field(250.0, description="largest speed of the tool along its path")
     acceleration: Above = 1000.0
-    turn: Above = Field(90.0, description="of the tool's orientation, at most")
+    turn: Above = Field(90.0, description="largest speed of turns of the tool")
     flat: Vector = Field(
         (0.0, 0.0, 1.0),
         description="with a positioner that follows: the tool axis, away from the work, in the robot's base",
@@ -96,8 +100,8 @@ class Robot(Options):
     follow: bool = Field(
         True, description="the positioner turns so that the tool axis is flat; false: it stays at home"
     )
-    joints: str = Field("", description="name by which the hook damageest_kinematics knows the robot; empty: no joints")
-    limits: tuple[Limits, ...] = Field((), description="of the joints that the hook gives")
+    joints: str = Field("", description="name of the robot for the hook damageest_kinematics; empty: no joints")
+    limits: tuple[Limits, ...] = Field((), description="limits of the joints that the hook gives")
 
 
 class Command(Options):
@@ -124,7 +128,7 @@ class Process(Options):
 
     on: Command
     off: Command
-    channels: dict[str, Channel] = Field({}, description="by the name that path.process gives them")
+    channels: dict[str, Channel] = Field({}, description="channels, by their names in path.process")
 
 
 class Post(Options):
@@ -136,16 +140,19 @@ class Post(Options):
         description="5 axes: rotary angles, or the tool axis as a vector (Siemens A3 B3 C3, Heidenhain TX TY TZ)",
     )
     tcp: Literal["control", "table"] = Field(
-        "control", description="control: it keeps the tool's point, coordinates are the part's; table: it does not, "
-        "coordinates are turned with the table"
-    )  # fmt: skip
+        "control",
+        description="control: the control keeps the tool's point, coordinates are the part's; table: coordinates turn "
+        "with the table",
+    )
     step: float = Field(
         2.0, gt=0, le=10, description="largest turn of the tool axis or of a rotary axis between two points"
     )
-    blend: float = Field(0.05, ge=0, description="how far the control may leave the corners of a pass, in mm")
+    blend: float = Field(0.05, ge=0, description="largest deviation of the control at the corners of a pass, in mm")
     head: tuple[str, ...] = Field((), description="further lines at the beginning, before the first move")
     foot: tuple[str, ...] = Field((), description="further lines at the end")
-    configuration: str = Field("", description="of the arm, in the robot's own words: S and T of KUKA, CONFIG of Fanuc")
+    configuration: str = Field(
+        "", description="configuration of the arm in the robot's own words: S and T of KUKA, CONFIG of Fanuc"
+    )
 
 
 class Machine(Options):
@@ -161,8 +168,8 @@ class Machine(Options):
     home: dict[str, float] = Field(
         {}, description="axes, by name, where the program begins and ends: X, Y, Z, A, C; A1 to A6, E1, E2 of a robot"
     )
-    approach: float = Field(50.0, ge=0, description="from so far along the tool axis the first point is reached")
-    retract: float = Field(50.0, ge=0, description="so far along the tool axis the tool leaves the last point")
+    approach: float = Field(50.0, ge=0, description="distance along the tool axis of the approach to the first point")
+    retract: float = Field(50.0, ge=0, description="distance along the tool axis of the retract from the last point")
     process: Process
     post: Post = Post()
 

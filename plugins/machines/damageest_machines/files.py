@@ -33,7 +33,7 @@ def find_file(machine: Path | str | None) -> Path:
         return shipped[str(machine)]
     raise StageError(
         f"there is no machine '{machine}'{suggest(str(machine), list(shipped))}",
-        f"{known}; or give a file, as mine.yaml",
+        f"{known}; or give a file, for example mine.yaml",
     )
 
 

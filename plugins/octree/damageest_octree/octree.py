@@ -45,7 +45,7 @@ class Octree(EncloseAll):
         None,
         ge=5,
         le=16,
-        description="levels of the octree over the cube round the part; default: as many as `cell` needs",
+        description="levels of the octree over the cube around the part; default: the number that `cell` needs",
     )
     cell: float | None = Field(
         None, gt=0, description="edge of the finest cells, in the job's unit; default: the larger of tolerance and "
@@ -80,7 +80,7 @@ class Octree(EncloseAll):
         if flags.reach:
             notes += (f"gaps between the scan points were closed up to {2 * flags.reach} cells of {cube.cell:.3g}",)
         if flags.unseen > NOTED_UNSEEN:
-            notes += (f"{flags.unseen:.1%} of the part's skin has no scan points and was taken as intact",)
+            notes += (f"{flags.unseen:.1%} of the part's skin has no scan points and counts as intact",)
         losses = find_losses(cube, flags, aligned, sites)
         largest = max((count_box_cells(flags, nodes) for nodes, _ in losses), default=0)
         if largest * BYTES_PER_CELL > self.memory * GIB:

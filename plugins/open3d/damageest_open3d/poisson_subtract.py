@@ -153,7 +153,7 @@ def _keep_closed(vertices: Floats, faces: Ints) -> tuple[Mesh, tuple[str, ...]]:
     if loose[largest]:
         raise StageError(
             f"the Poisson body is not watertight: {int(loose[largest])} of its edges have a triangle on one side "
-            "only, as where one side of the part has no scan points",
+            "only, as when one side of the part has no scan points",
             "a scan of all sides, or a larger enclose.scale",
             method="implicit",
         )

@@ -113,13 +113,13 @@ def describe_surplus(path: DepositPath) -> DepositPath:
     if share > MUCH_SURPLUS:
         beside = "" if path.fill is None else f"; {path.fill.spill:.4g} lies beside the deposit"
         notes.append(
-            f"the beads add {path.surplus_volume:.4g} ({share:.0%} of the deposit) more than what they fill{beside}: "
-            "it is to be milled off; thinner layers and narrower beads add less"
+            f"the beads add {path.surplus_volume:.4g} ({share:.0%} of the deposit) beyond the volume that they fill{beside}: "
+            "mill it off; thinner layers and narrower beads add less"
         )
     if path.fill is not None and path.fill.sunk > MUCH_SUNK * path.deposit_volume:
         notes.append(
             f"beads lie in {path.fill.sunk:.4g} of intact metal ({path.fill.sunk / path.deposit_volume:.0%} of the "
-            "deposit): a smaller path.penetration or thinner layers leave more of it"
+            "deposit); a smaller path.penetration or thinner layers keep more of it"
         )
     return replace(path, notes=(*path.notes, *notes))
 
@@ -139,10 +139,8 @@ def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath
         mean = path.length / max(path.passes, 1)
         notes.append(
             f"travel is {path.travel / total:.0%} of the length: {path.passes} passes of {mean:.3g} in the mean, each "
-            "with a way there, down and up"
+            "with an approach and a retract; wider beads give fewer passes"
         )
     if moves.blocked:
-        notes.append(
-            f"for {moves.blocked} travels no way was found that keeps half of the gap; check them before you run them"
-        )
+        notes.append(f"for {moves.blocked} travels no way keeps half of the gap; check them before you run them")
     return replace(path, notes=tuple(notes))

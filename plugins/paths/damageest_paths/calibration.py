@@ -24,8 +24,8 @@ class Trial(Options):
     """A bead that was laid with some settings, and measured."""
 
     set: dict[Name, float] = Field(min_length=1, description="values by name, as in process; speed is the feed")
-    width: Size = Field(description="of the bead")
-    height: Size = Field(description="of the bead")
+    width: Size = Field(description="width of the bead")
+    height: Size = Field(description="height of the bead")
 
 
 def _check_trials(trials: tuple[Trial, ...]) -> tuple[Trial, ...]:

@@ -41,7 +41,7 @@ class Setting(Options):
         None, description="number of the layer, or [first, last]; 1 lies on the part's own metal; default: all"
     )
     kind: Literal["row", "ring", "spiral", "rim", "gap", "contour", "fill"] | None = Field(
-        None, description="of the pass; contour: ring and rim, fill: row, spiral and gap; default: all"
+        None, description="kind of pass; contour: ring and rim, fill: row, spiral and gap; default: all"
     )
     first: bool = Field(False, description="only the first pass of a layer")
     radius: Span | None = Field(

@@ -36,17 +36,23 @@ def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto
 class BeamShape(Options):
     """What goes from the nozzle's tip to the bead: light, powder, wire or arc."""
 
-    radius: Length | None = Field(None, description="at the bead, in the job's unit; default: half the bead's width")
-    cone: float = Field(0.0, ge=0, lt=60, description="half the angle by which it widens towards the tip, in degrees")
+    radius: Length | None = Field(
+        None, description="radius at the bead, in the job's unit; default: half the bead's width"
+    )
+    cone: float = Field(0.0, ge=0, lt=60, description="half the opening angle towards the tip, in degrees")
 
 
 class Nozzle(Options):
     """A nozzle that is a solid of revolution, or a closed mesh with its tip at 0 and its axis along z."""
 
-    tip_radius: float | None = Field(None, ge=0, allow_inf_nan=False, description="of the flat tip, in the job's unit")
-    cone_angle: float = Field(30.0, ge=0, lt=85, description="between the axis and the side of the cone, in degrees")
-    length: Length | None = Field(None, description="of the whole nozzle from the tip, in the job's unit")
-    body_radius: Length | None = Field(None, description="of the cylinder above the cone, in the job's unit")
+    tip_radius: float | None = Field(
+        None, ge=0, allow_inf_nan=False, description="radius of the flat tip, in the job's unit"
+    )
+    cone_angle: float = Field(
+        30.0, ge=0, lt=85, description="angle between the axis and the side of the cone, in degrees"
+    )
+    length: Length | None = Field(None, description="length of the whole nozzle from the tip, in the job's unit")
+    body_radius: Length | None = Field(None, description="radius of the cylinder above the cone, in the job's unit")
     mesh: JobPath | None = Field(None, description="file of a closed mesh, in the job's unit, instead of the others")
     beam: BeamShape = Field(
         BeamShape(),
@@ -97,8 +103,8 @@ class Layers(Path):
         "of the cavity, up to 75 degrees steep; auto: conformal where planes lose more than 7 % of the deposit and it "
         "loses at most half of that, else planar",
     )
-    width: Length = Field(description="of a bead; optional with calibration, like height")
-    feed: Length = Field(description="speed of deposition, in lengths a minute; where a bead is higher, it is less")
+    width: Length = Field(description="width of a bead; optional with calibration, like height")
+    feed: Length = Field(description="speed of deposition, in lengths a minute; less where a bead is higher")
     nozzle: Nozzle = Field(
         description="{tip_radius, cone_angle, length, body_radius}: a flat tip, a cone of this angle (degrees) between "
         "axis and side, a cylinder; or {mesh: path}, tip at 0, axis along z"
@@ -121,13 +127,13 @@ class Layers(Path):
     )
     angle: Literal["auto"] | Angle = Field(
         "auto",
-        description="of the rows in the first layer, in degrees; auto: 0, but along a region that is much longer than "
-        "wide, in every layer",
+        description="direction of the rows in the first layer, in degrees; auto: 0, but along a long narrow "
+        "region, in every layer",
     )
-    turn: float = Field(90.0, allow_inf_nan=False, description="of the rows from layer to layer, in degrees")
+    turn: float = Field(90.0, allow_inf_nan=False, description="turn of the rows from layer to layer, in degrees")
     starts: Literal["spread", "aligned"] | StartPlace = Field(
         "spread",
-        description="where rings begin: spread: in another direction from layer to layer; aligned; {at: [x, y, z]}",
+        description="starts of rings: spread: in another direction from layer to layer; aligned; {at: [x, y, z]}",
     )
     overhang: float = Field(
         45.0, ge=0, lt=90, description="largest angle between build direction and an overhanging side, in degrees"
@@ -164,8 +170,8 @@ class Layers(Path):
         description="lift between passes, along the tool; default: none where the way is free without, else two widths "
         "of a bead",
     )
-    start_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass begins before its start")
-    stop_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="how far a pass goes on beyond its end")
+    start_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="lead of a pass before its start")
+    stop_overlap: float = Field(0.0, ge=0, allow_inf_nan=False, description="overrun of a pass beyond its end")
     sites: tuple[int, ...] = Field((), description="numbers of the sites that are built up first, in this order")
     process: ProcessTable = Field(
         (),
@@ -175,12 +181,12 @@ class Layers(Path):
     interpass: float = Field(
         0.0,
         ge=0,
-        description="least seconds between laying a bead and one of another pass beside or on it: the tool waits",
+        description="least seconds between a bead and the next one beside or on it of another pass: the tool waits",
     )
     calibration: Trials = Field(
         (),
-        description="rows {set: {speed: .., power: ..}, width, height}: beads that were laid and measured; width and "
-        "height of beads follow from them, and are told in the path's files",
+        description="rows {set: {speed: .., power: ..}, width, height}: measured beads of trials; they give width "
+        "and height of the planned beads, which the path's files list",
     )
     simulate: bool = Field(True, description="compare the union of the beads with the deposit, on voxels")
 

@@ -27,9 +27,7 @@ class Sweep(Enclose):
     refines: ClassVar[bool] = True  # A sweep uses no background, so a coarse one is enough.
 
     use: Literal["sweep"] = "sweep"
-    overhang: float = Field(
-        3.0, ge=0, le=20, description="how far the surface is extended beyond its rim, in tolerances"
-    )
+    overhang: float = Field(3.0, ge=0, le=20, description="extension of the surface beyond its rim, in tolerances")
     steepest: float = Field(
         80.0, gt=0, lt=90, description="largest angle between the normal of the surface and the sweep, in degrees"
     )

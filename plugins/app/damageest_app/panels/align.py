@@ -82,7 +82,11 @@ class AlignPanel(Panel):
                 tool.build()
         html.Div("align: {{ align_use }}", classes="fine mt-4", raw_attrs=mark("align-use"))
         v3.VBtn(
-            "find the pose anew", v_if=("align_use !== 'register'",), size="small", variant="text", click=self.register
+            "search the pose again",
+            v_if=("align_use !== 'register'",),
+            size="small",
+            variant="text",
+            click=self.register,
         )
 
     async def register(self) -> None:

@@ -26,7 +26,7 @@ class CutTool(Panel):
         with html.Div(v_if=("cut",), classes="mt-2"):
             html.Div(
                 "{{ {first: 'Turn the scan so that the cut is a line, and click one end of it.', second: 'Click the other "
-                "end.', ready: 'What is coloured is removed.'}[cut] }}",
+                "end.', ready: 'The coloured points are removed.'}[cut] }}",
                 classes="fine text-primary",
                 raw_attrs=mark("cut-words"),
             )

@@ -31,7 +31,7 @@ class DatumTool(Panel):
     def build(self) -> None:
         html.Div(
             "Click unworn faces: they fix the pose. Together, or "
-            "in order: A, then B, then C (3-2-1). A second click takes a face away.",
+            "in order: A, then B, then C (3-2-1). A second click removes a face.",
             classes="fine mb-2",
         )
         with v3.VBtnToggle(v_model=("datum_slot",), mandatory=True, divided=True, color="primary", classes="mb-2"):

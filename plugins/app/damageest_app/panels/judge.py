@@ -105,7 +105,7 @@ class JudgePanel(Panel):
                         click_stop=(self.decide, "[one.id, 'drop']"),
                     )
                     v3.VBtn(
-                        "as the criterion says",
+                        "by the criterion",
                         size="small",
                         variant="text",
                         v_if=("one.choice",),
@@ -216,7 +216,7 @@ class JudgePanel(Panel):
         if row is None:
             return
         if choice == "accept" and row["level"] != "doubtful" and row["choice"] != "drop":
-            self.session.say(f"site {number} is {row['level']}, and accepted without a line in the job", "info")
+            self.session.say(f"site {number} is {row['level']}, accepted without a line in the job", "info")
             return
         await self.session.apply(lambda tree: edits.choose_site(tree, number, choice, row["level"] == "doubtful"))
 

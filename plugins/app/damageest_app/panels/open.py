@@ -86,7 +86,7 @@ class OpenPanel(Panel):
             v3.VSelect(
                 v_model=("new_unit",),
                 items=("units", list(UNITS)),
-                label="unit of files that name none",
+                label="unit of files without a unit",
                 classes="mr-3",
             )
             v3.VBtn(

@@ -52,14 +52,14 @@ class PairsTool(Panel):
                 raw_attrs=mark("take-pairs"),
             )
             v3.VBtn(
-                "take one back",
+                "undo one pair",
                 size="small",
                 variant="text",
                 click=self.drop,
                 disabled=("!pairs.length && !half",),
                 raw_attrs=mark("drop-pair"),
             )
-        html.Div("They stand in the job; run it.", v_if=("pairs_in_job",), classes="fine mt-1")
+        html.Div("The pairs are in the job; run it.", v_if=("pairs_in_job",), classes="fine mt-1")
 
     async def take(self) -> None:
         await self.session.apply(lambda tree: edits.set_pairs(tree, self.pairs))

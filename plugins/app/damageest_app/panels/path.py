@@ -37,7 +37,7 @@ class PathTool(Panel):
         self.state.change("path_layer")(lambda **_: self._go_to_layer())
 
     def build(self) -> None:
-        html.Div("Passes layer by layer that build the deposit up.", classes="fine mb-2")
+        html.Div("Passes of the deposit, layer by layer.", classes="fine mb-2")
         with html.Div(v_if=("!has_path",)):
             v3.VBtn(
                 "plan a path",
@@ -127,7 +127,7 @@ class PathTool(Panel):
         self.state.path_share = 1.0
         self.state.path_faults = results.list_path_faults() if results else []
         much = [one["text"] for one in self.state.path_faults if one["is_much"]]
-        self.state.path_left = "Do not take the paths to a machine as they are: " + "; ".join(much) if much else ""
+        self.state.path_left = "Do not run these paths on a machine: " + "; ".join(much) if much else ""
 
     def _go_to_layer(self) -> None:
         """The slider of layers was moved; where the one of the time moved it, both agree already."""

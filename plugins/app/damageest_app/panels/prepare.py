@@ -82,13 +82,13 @@ class PreparePanel(Panel):
                     raw_attrs=mark("crop-keep"),
                 )
                 v3.VBtn("drop the box", size="small", variant="tonal", click=(self.crop, "['drop']"))
-                v3.VBtn("below z of the box away", size="small", variant="tonal", click=(self.crop, "['above']"))
+                v3.VBtn("remove below the box", size="small", variant="tonal", click=(self.crop, "['above']"))
         with html.Div(v_for=("(one, k) in crops",), key=("k",), classes="fine"):
             html.Span("{{ k + 1 }}. {{ one }}")
-        v3.VBtn("take the last crop back", v_if=("crops.length",), size="small", variant="text", click=self.uncrop)
+        v3.VBtn("undo the last crop", v_if=("crops.length",), size="small", variant="text", click=self.uncrop)
         html.Div("Tolerance", classes="head")
         html.Div(
-            "Nearer to the part than this is intact; {{ tolerance_auto ? 'auto, from the noise of the scan' : 'as the job says' }}.",
+            "Points nearer to the part than this are intact; {{ tolerance_auto ? 'auto, from the noise of the scan' : 'as the job says' }}.",
             classes="fine",
         )
         with html.Div(v_if=("histogram",)):

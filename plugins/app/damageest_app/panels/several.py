@@ -47,7 +47,7 @@ class SeveralPanel(Panel):
                 classes="fine",
             )
         v3.VBtn(
-            "run those that were not", size="small", color="primary", variant="tonal", click=self.start_all,
+            "run all not yet run", size="small", color="primary", variant="tonal", click=self.start_all,
             disabled=("running || !rows.some(x => x.state === 'not run')",), raw_attrs=mark("run-all"),
         )  # fmt: skip
 

@@ -99,7 +99,7 @@ def parse_numbers(option: str, text: str) -> list[int]:
     except ValueError:
         values = [-1]
     if any(value < 0 for value in values):
-        raise InputError(f"{option}: '{text}' is not valid; give whole numbers separated by commas, as 0,1,2")
+        raise InputError(f"{option}: '{text}' is not valid; give whole numbers separated by commas, for example 0,1,2")
     return values or ([0] if option == "--seeds" else [])
 
 

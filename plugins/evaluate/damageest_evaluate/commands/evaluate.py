@@ -58,11 +58,13 @@ Vary = Annotated[
 Against = Annotated[
     list[str] | None,
     typer.Option(
-        metavar="SETTINGS", help="Other settings to compare with, as 'method=octree enclose.depth=8'. May be repeated."
+        metavar="SETTINGS",
+        help="Other settings to compare with, for example 'method=octree enclose.depth=8'. May be repeated.",
     ),
 ]
 Noise = Annotated[
-    str, typer.Option(metavar="A,B", help="Noise of the scan: multiples of its default, or lengths, as 0.02mm.")
+    str,
+    typer.Option(metavar="A,B", help="Noise of the scan: multiples of its default, or lengths, for example 0.02mm."),
 ]
 Points = Annotated[str, typer.Option(metavar="A,B", help="Number of points of the scan.")]
 Settings = Annotated[
@@ -154,7 +156,7 @@ def suite_command(
     noise: Noise = "",
     points: Points = "",
     tolerance: Annotated[
-        str, typer.Option(metavar="A,B", help="Multiples of the noise, lengths, as 1mm, or auto.")
+        str, typer.Option(metavar="A,B", help="Multiples of the noise, lengths such as 1mm, or auto.")
     ] = "4",
     settings: Settings = None,
     intervals: Annotated[

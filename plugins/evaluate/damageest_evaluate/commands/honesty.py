@@ -16,9 +16,7 @@ def command(
     ] = "",
     parts: Annotated[str, typer.Option(metavar="A,B", help="Names of parts. Default: all.")] = "",
     seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds; each case runs once with each of them.")] = "0",
-    case: Annotated[
-        str, typer.Option(metavar="A,B", help="Numbers of cases, as the list of silent ones has them.")
-    ] = "",
+    case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases, from the list of silent ones.")] = "",
     points: Annotated[int, typer.Option(min=100, help="Number of points of each scan.")] = 50_000,
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 2,
     timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,

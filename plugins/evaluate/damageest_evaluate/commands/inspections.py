@@ -22,7 +22,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count which repaired parts are judged as they are, and which are signed as met though they are not.
+    """Count right verdicts on repaired parts, and faulty parts signed as met.
 
     Brackets, blocks and shafts with three repaired sites: perfect ones, and ones with a known fault.
     """

@@ -21,7 +21,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Open ragged damages before deposition, and compare what a path of 3 axes reaches of them without and with it."""
+    """Open ragged damages before deposition, and compare the volume that a 3-axis path reaches."""
     from damageest.registry import Registry
     from damageest_evaluate.paths.prepare import make_prepare_table, run_prepare
 

@@ -23,8 +23,8 @@ def command(
 ) -> None:
     """Run real parts with their CAD and compare the largest site with a crude difference.
 
-    The difference shares no code with the program. In the pose found it is the sum of what is deeper than the
-    tolerance, and of what goes on from there down to the skin beside it; both have to be in the site's interval.
+    The difference shares no code with the program. In the found pose it sums the loss deeper than the tolerance, and
+    the same with its shallow rim; both sums must lie in the site's interval.
     """
     from damageest.registry import Registry
     from damageest_evaluate.commands._counted import run_counted, split_words

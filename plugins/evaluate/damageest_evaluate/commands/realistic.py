@@ -15,7 +15,7 @@ def command(
         str, typer.Option(metavar="A,B", help="Sensors, in full or their beginning. Default: all.")
     ] = "",
     parts: Annotated[str, typer.Option(metavar="A,B", help="Names of parts. Default: all.")] = "",
-    case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases, as --list has them.")] = "",
+    case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases, from --list.")] = "",
     every: Annotated[int, typer.Option(min=1, help="Take one case of so many.")] = 1,
     points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 40_000,
     workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,

@@ -14,7 +14,9 @@ from damageest_evaluate.commands._counted import AsJson, prepare_places, show_ta
 
 def command(
     kinds: Annotated[str, typer.Option(metavar="A;B", help="Names of cases. Default: all but the dense scan.")] = "",
-    points: Annotated[str, typer.Option(metavar="N", help="Points of every scan, as 1e6, instead of the case's.")] = "",
+    points: Annotated[
+        str, typer.Option(metavar="N", help="Points of every scan, for example 1e6, instead of the case's.")
+    ] = "",
     settings: Annotated[
         list[str] | None, typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value.")
     ] = None,
@@ -40,7 +42,7 @@ def command(
     try:
         count = int(float(points or 0))
     except (ValueError, OverflowError):
-        raise InputError(f"--points: '{points}' is not a number, as 1e6") from None
+        raise InputError(f"--points: '{points}' is not a number, for example 1e6") from None
     names = [name.strip() for name in kinds.split(";")] if kinds else list(USUAL)
     rows: list[list[dict[str, Any]]] = []
     for case in make_speed_cases(names, count, settings or (), Registry.discover()):

@@ -21,7 +21,7 @@ def command(
     """Draw scans again and compare the verdicts.
 
     Each scan is drawn again with other points, half the points, in another frame, and with a tolerance that is 10 %
-    larger. The sites of the first run are looked for in the others.
+    larger. The command searches the sites of the first run in the others.
     """
     from damageest.registry import Registry
     from damageest_evaluate.commands._counted import parse_numbers, prepare_places
