@@ -185,7 +185,7 @@ def test_settings_are_taken_as_a_mapping(job: Path) -> None:
 
 
 def test_settings_are_not_taken_as_one_text(job: Path) -> None:
-    with pytest.raises(InputError, match=r"settings: give a list,  \['tolerance=0.5'\], or a mapping"):
+    with pytest.raises(InputError, match=r"settings: give a list, \['tolerance=0.5'\], or a mapping"):
         damageest.run(job, settings="tolerance=0.5")
 
 

@@ -1,5 +1,16 @@
 """Calls in a process of their own, for native libraries that may crash, hang or take all memory."""
 
+# The modules:
+# worker.py, process.py, serve.py: caller's side, one worker, its own side
+# portable.py: start of a worker on systems without inherited files
+# failures.py: messages of failed calls
+# transfer.py: arrays in shared memory
+# supervise.py: a process that watches its fork
+# notes.py, clock.py, telling.py: what a worker does, since when, in which part of a stage
+# parent.py: a process ends with its parent
+# limits.py, memory.py: limits, memory that work will need
+# one_thread.py, lost_threads.py: linear algebra in one thread; threads of scipy lost for want of memory
+
 from damageest.isolation.failures import ProcessError
 from damageest.isolation.limits import Limits, format_bytes, limit_this_process, measure_free_memory, parse_memory
 from damageest.isolation.memory import require_memory

@@ -1,5 +1,13 @@
 """What there is to run: contracts, built-in implementations, plugins, and what is broken among them."""
 
+# The modules:
+# contracts.py, builtins.py: contracts and their defaults; built-in implementations
+# registry.py, loading.py, hookspecs.py: what there is, how plugins are loaded, their hooks
+# outputs.py: does the output of a stage fit its inputs
+# guards.py: the owner of a failing writer
+# bundled.py: which package brings what, for messages
+# system_libraries.py: missing system libraries
+
 from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any

@@ -29,7 +29,7 @@ def home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
         ("nowhere/x.yaml", "there is no folder nowhere for x.yaml; make it (mkdir -p nowhere), or name another file"),
         ("no where/x.yaml", "mkdir -p 'no where'"),
         ("file/x.yaml", "file is a file, not a folder; name another folder"),
-        ("folder.yaml", "folder.yaml is a folder; name a file, as folder.yaml/name.yaml"),
+        ("folder.yaml", "folder.yaml is a folder; name a file, for example folder.yaml/name.yaml"),
     ],
 )
 @pytest.mark.parametrize("force", [(), ("--force",)])

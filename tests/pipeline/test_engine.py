@@ -159,7 +159,7 @@ def test_points_on_all_of_the_skin_are_made_only_where_a_stage_takes_them(
     result = damageest.run(small_done, settings=[setting], output=True, registry=registry)
     assert ("sample" in {record.stage for record in result.stages}) == are_taken
     assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.03)
-    note = "sample: uniform did not run, since no stage took its points"
+    note = "sample: uniform did not run: no stage uses its points"
     assert (note in map(str, result.warnings)) != are_taken
 
 

@@ -199,7 +199,7 @@ def test_what_a_path_leaves_out_is_told_in_red_from_a_twentieth() -> None:
     told = Results.list_path_faults(SimpleNamespace(content={"sites": sites}, unit="mm"))  # type: ignore[arg-type]
     assert [one["is_much"] for one in told] == [True, False, False]
     assert told[0]["text"].startswith("site 1: 15.1% of the deposit is not filled; 332 mm³ not reached; ")
-    assert "the passes add 52% more" in told[0]["text"]
+    assert "the passes add 52% beyond" in told[0]["text"]
     assert told[1]["text"] == "site 1: the nozzle is near the flange"
 
 

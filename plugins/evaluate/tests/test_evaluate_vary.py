@@ -81,5 +81,5 @@ def test_faults_are_named(wanted: VariationRequest, said: str) -> None:
 
 
 def test_multiples_of_no_noise_are_refused() -> None:
-    with pytest.raises(InputError, match=r"multiple of 0; give a length with its unit, as 0\.01mm"):
+    with pytest.raises(InputError, match=r"multiple of 0; give a length with its unit, for example 0\.01mm"):
         make_variants(VariationRequest(noise="1,2"), Baseline("mm", {"noise": 0.0, "points": 10}, 0.1, False, False))

@@ -113,7 +113,7 @@ def describe_surplus(path: DepositPath) -> DepositPath:
     if share > MUCH_SURPLUS:
         beside = "" if path.fill is None else f"; {path.fill.spill:.4g} lies beside the deposit"
         notes.append(
-            f"the beads add {path.surplus_volume:.4g} ({share:.0%} of the deposit) beyond the volume that they fill{beside}: "
+            f"the beads add {path.surplus_volume:.4g} ({share:.0%} of the deposit) beyond what they fill{beside}: "
             "mill it off; thinner layers and narrower beads add less"
         )
     if path.fill is not None and path.fill.sunk > MUCH_SUNK * path.deposit_volume:
