@@ -243,14 +243,14 @@ class _Check:
             method = "surface"
         if method == "auto" and whole_job and whole_job[0].name != DEFAULTS[EncloseAll]:
             method = own
-        if whole_job and method not in ("auto", own):
+        if whole_job and method not in ("auto", "both", own):
             self.add_fault(
                 f"this implementation takes all sites at once; it belongs to  method: {own}", EncloseAll.stage, "use"
             )
         if method in self.registry.methods(EncloseAll):
             for contract in surface:
                 self.add_fault(f"not a stage of  method: {method}; remove it, or use  method: surface", contract.stage)
-        unused: dict[str, tuple[Contract, ...]] = {"surface": (EncloseAll,), "auto": ()}
+        unused: dict[str, tuple[Contract, ...]] = {"surface": (EncloseAll,), "auto": (), "both": ()}
         return [contract for contract in DEFAULTS if contract not in unused.get(method, SURFACE_ONLY)], method
 
     def find_default(self, contract: Contract, method: str) -> Chosen | None:

@@ -73,7 +73,8 @@ class Header(Options):
     method: str = Field(
         "auto",
         description="the route; surface: site by site; implicit: all sites at once; auto: implicit, then surface for "
-        "sites that it fails on or that the scan contradicts; plugins may add others",
+        "sites that it fails on or that the scan contradicts; both: as auto, and a site whose volume by the other "
+        "method is outside its interval is doubtful; plugins may add others",
     )
     sites: SiteChoice = Field(SiteChoice(), description="sites to drop, to merge and to keep")
     sections: tuple[SectionChoice, ...] = Field(

@@ -8,6 +8,7 @@ from damageest.artefacts import Reason, Sites
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Branch, Engine, Route, follow
+from damageest.pipeline.other_method import note_other_volumes
 from damageest.pipeline.state import FoundSite, JobState
 
 BUDGET = 40
@@ -15,11 +16,13 @@ BUDGET = 40
 gives the same bytes."""
 
 
-def fall_back(first: Route, second: Route) -> Branch:
+def fall_back(first: Route, second: Route, compares: bool = False) -> Branch:
     """Follows ``first``, and ``second`` for the clusters without a site that the scan agrees with.
 
     A site of the first route whose evidence is against it stays unless sites of the second route, with evidence for
     them, stand for all of its clusters. Failures of the first route are not reported: the second route has its own.
+
+    ``compares``: the second route is followed for all clusters, and each site has its volume by the other route too.
     """
 
     def run(engine: Engine, state: JobState) -> JobState:
@@ -34,13 +37,15 @@ def fall_back(first: Route, second: Route) -> Branch:
             told = Reason("fell_back", f"method surface taken, since implicit failed: {text}")
             tried = state.with_value(JobState.warnings, (*state.warnings, told))
         agreed = {cluster for site in tried.found if site.evidence.consistent for cluster in site.clusters}
-        wanted = tuple(k for k in range(1, state.sites.count + 1) if k not in agreed)
+        wanted = tuple(k for k in range(1, state.sites.count + 1) if compares or k not in agreed)
         if not wanted:
             return tried.with_value(JobState.failures, before, state.key("failures"))
-        wanted, left = share_budget(state.sites, wanted)
+        wanted, left = (wanted, ()) if compares else share_budget(state.sites, wanted)
         again = state.with_value(JobState.warnings, tried.warnings, tried.key("warnings"))
         again = follow(second, engine, again.with_value(JobState.wanted, wanted))
         sites = merge_sites(tried.found, again.found)
+        if compares:
+            sites = note_other_volumes(sites, tried.found, again.found)
         done = {cluster for site in sites for cluster in site.clusters}
         lacking = next((error for error in again.failures if error.extra), None)
         if lacking is not None and any(error.site in done for error in again.failures):
@@ -48,7 +53,7 @@ def fall_back(first: Route, second: Route) -> Branch:
         failures = tuple(drop_tried(error) for error in again.failures if error.site not in done)
         left = tuple(number for number in left if number not in done)
         failures += (say_used_up(state.sites, left),) if left else ()
-        key = digest("fall_back", tried.key("found"), again.key("found"))
+        key = digest("compared" if compares else "fall_back", tried.key("found"), again.key("found"))
         return again.with_value(JobState.found, sites, key).with_value(JobState.failures, (*before, *failures), key)
 
     return Branch("fall_back", ("sites", "failures", "warnings"), (first, second), run)

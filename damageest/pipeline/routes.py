@@ -199,5 +199,9 @@ WRITE: Route = (
 def route_of(method: str) -> Route:
     """The route of a job's `method`. Any other than the three belongs to an implementation that takes all sites at
     once, as `octree`."""
-    middle = {"surface": BY_SITE, "auto": (fall_back(AT_ONCE, BY_SITE),)}.get(method, (where_damaged(*AT_ONCE),))
+    middle = {
+        "surface": BY_SITE,
+        "auto": (fall_back(AT_ONCE, BY_SITE),),
+        "both": (fall_back(AT_ONCE, BY_SITE, compares=True),),
+    }.get(method, (where_damaged(*AT_ONCE),))
     return (*ACQUIRE, *middle, *CLOSE)

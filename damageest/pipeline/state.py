@@ -161,7 +161,8 @@ class FoundSite(_SiteState):
     ``verdict``: what the damage volume is worth; ``accepted``: whether it is part of the result's damage;
     ``displaced``, ``twins``, ``bent_wall``, ``covered``: as in `SiteFacts`; ``uncertainty``: of the volume of
     ``damage``, and ``error``: the same in a form that adds up over sites; ``beyond``: how it lies against its points;
-    ``dependences``: on the free motions of the pose; ``enclosures``: as in `Site`."""
+    ``dependences``: on the free motions of the pose; ``enclosures``: as in `Site`; ``other_volume``: by the method that
+    did not make it; None where that was not asked, NaN where it gave none."""
 
     clusters: tuple[int, ...] = ()
     method: str = ""
@@ -180,6 +181,7 @@ class FoundSite(_SiteState):
     beyond: BeyondPoints = field(default_factory=BeyondPoints)
     dependences: tuple[Dependence, ...] = ()
     enclosures: tuple[Solid, ...] = ()
+    other_volume: float | None = None
 
     damage = Value[Solid]()
     others = Value[Solid | None]()

@@ -181,6 +181,7 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         beyond_words=site.beyond.reason,
         shut=visible.shut,
         turned=visible.turned,
+        other_volume=site.other_volume,
     )
 
 

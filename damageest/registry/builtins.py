@@ -88,6 +88,7 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.nothing import Nothing
     from damageest.rules.off_boundary import OffBoundary
     from damageest.rules.one_motion import OneMotion
+    from damageest.rules.other_method import OtherMethod
     from damageest.rules.pieces import Pieces
     from damageest.rules.pose import PoseDoubt
     from damageest.rules.revision import Revision
@@ -99,7 +100,7 @@ def damageest_rules() -> list[type[Rule]]:
     return [
         Nothing, Pieces, PoseDoubt, AdaptedSkin, Displaced, Revision, TwoSheets, MisplacedView, OneMotion, Scattered,
         OffBoundary, IntactInside, IntactOver, NotVisible, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered,
-        FreePoseRule, FewPoints, FadingOut, Dent, Terms,
+        OtherMethod, FreePoseRule, FewPoints, FadingOut, Dent, Terms,
     ]  # fmt: skip
 
 

@@ -128,7 +128,7 @@ class Registry:
     def methods(self, contract: Contract | None = None) -> tuple[str, ...]:
         """The values of a job's `method`; with a ``contract``, those that its implementations name."""
         if contract is None:
-            return ("auto", "surface", *self.methods(EncloseAll))
+            return ("auto", "both", "surface", *self.methods(EncloseAll))
         return tuple(dict.fromkeys(item.method for item in self.of(contract.stage) if item.contract is contract))
 
     def usual(self, contract: Contract, method: str) -> str:

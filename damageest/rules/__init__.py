@@ -79,7 +79,8 @@ class SiteFacts:
     ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that may be dented there, else 0.
     ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
     ``beyond_words``: how it was found. ``shut`` and ``turned``: shares of its inner surface that could be seen from
-    nowhere, and only from where the skin beside it was not seen.
+    nowhere, and only from where the skin beside it was not seen. ``other_volume``: by the other method; None where
+    that was not asked, NaN where it gave none.
     """
 
     volume: float
@@ -109,6 +110,7 @@ class SiteFacts:
     beyond_words: str = ""
     shut: float = 0.0
     turned: float = 0.0
+    other_volume: float | None = None
 
 
 class Rule(ABC):

@@ -147,7 +147,7 @@ TOPICS = (
     Topic(
         "doubtful",
         "A site is doubtful, or its interval is wide",
-        ("nothing", "wide_interval", "off_boundary", "intact_inside", "intact_over"),
+        ("nothing", "wide_interval", "off_boundary", "intact_inside", "intact_over", "other_method"),
         "Read its reasons in the report and look at the place on the part. If the metal is missing there, accept "
         "the site by its number; if not, drop it. A better scan of this place makes the interval narrower. A "
         "larger tolerance removes shallow sites that are errors of the scan.",

@@ -27,7 +27,7 @@ from tests import damaged_box
 
 ROOT = Path(__file__).parents[2]
 PARTS = ("ACQUIRE", "BY_SITE", "AT_ONCE", "CLOSE", "WRITE")
-METHODS = ("auto", "surface", "implicit")
+METHODS = ("auto", "both", "surface", "implicit")
 POINTS = np.arange(12.0).reshape(4, 3)
 
 

@@ -107,7 +107,7 @@ def test_contracts_have_real_signatures() -> None:
 
 
 def test_methods_are_those_of_the_implementations(registry: Registry) -> None:
-    assert registry.methods()[:3] == ("auto", "surface", "implicit")
+    assert registry.methods()[:4] == ("auto", "both", "surface", "implicit")
     own = {item.method for item in registry.of("enclose") if item.contract is EncloseAll}
     assert set(registry.methods(EncloseAll)) == own
     for method in own:

@@ -59,7 +59,9 @@ def test_a_rule_gives_its_reason_and_no_other_rule_objects(code: str, case: dict
         assert (reason.effect == "open" and reason.amount is None) == case.get("open_end", False)
     assert site.uncertainty is not None
     level = decide(site.volume, open_end(site.interval, found), found, site.uncertainty.certain).level
-    expected = {None: "proven", "widens": "proven", "open": "likely", "contradicts": "doubtful"}[case["effect"]]
+    expected = {None: "proven", "note": "proven", "widens": "proven", "open": "likely", "contradicts": "doubtful"}[
+        case["effect"]
+    ]
     assert level == case.get("level", expected)
 
 
