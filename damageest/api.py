@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -49,7 +49,8 @@ def run(
     trimesh, PyVista, Open3D) and ``scan`` (`damageest.io.given.SCANS`) replace the job's files; both may also be in the
     mapping. ``settings`` are overrides: ``["cluster.eps=0.4"]``, or ``{"cluster.eps": 0.4}``. Lengths are in the job's
     unit. ``cache``: False computes all anew; a `MemoryCache` keeps what stages give from run to run, also without
-    files. ``progress`` is called in this thread when a stage or step begins; ``cancel``, as a `threading.Event`, ends
+    files. ``progress`` is called in this thread when a stage or step begins (where it fails, a warning says so, and it
+    is not called again); ``cancel``, as a `threading.Event`, ends
     the run from another thread. In a notebook a run without ``progress`` shows it by itself.
     ``limits`` of memory and time hold for stages that run in a process of their own, those that call a native library.
     As long as it runs, the linear algebra of numpy and scipy uses one thread in this process, so that the same job
@@ -58,6 +59,7 @@ def run(
     Raises JobError or InputError (job or input at fault), StageError (a stage failed or refused) and CancelledError.
     ``so_far`` of the error has what was computed before it.
     """
+    _check_types(cache, progress, cancel)
     registry, limits = registry or Registry.discover(), limits or Limits()
     if not isinstance(job, Job):
         source, given = _split(job, part, scan)
@@ -107,10 +109,24 @@ def _observed(registry: Registry, teller: Teller | None) -> Iterator[None]:
         registry.hooks.unregister(teller)
 
 
+def _check_types(cache: object, progress: object, cancel: object) -> None:
+    """Raises InputError before the work for what could fail only in its midst."""
+    given = {"cache": cache, "progress": progress, "cancel": cancel}
+    wanted = {
+        "cache": (isinstance(cache, bool | MemoryCache), "True, False or a damageest.MemoryCache"),
+        "progress": (progress is None or callable(progress), "a function of one damageest.Progress"),
+        "cancel": (cancel is None or hasattr(cancel, "is_set"), "a threading.Event, or what has is_set()"),
+    }
+    for name, (is_right, what) in wanted.items():
+        if not is_right:
+            raise InputError(f"{name}: a {type(given[name]).__name__} cannot be used; give {what}")
+
+
 def list_settings(settings: Sequence[str] | Mapping[str, Any]) -> Sequence[str]:
     """Overrides as the command line takes them. Raises InputError for a text, whose letters they would be."""
-    if isinstance(settings, str):
-        raise InputError(f'settings: give a list, [{settings!r}], or a mapping, for example {{"tolerance": 0.2}}')
+    if isinstance(settings, str) or not isinstance(settings, Iterable):
+        shown = settings if isinstance(settings, str) else "tolerance=0.2"
+        raise InputError(f'settings: give a list, [{shown!r}], or a mapping, for example {{"tolerance": 0.2}}')
     if not isinstance(settings, Mapping):
         return settings
     return [f"{name}={value if isinstance(value, str) else json.dumps(value)}" for name, value in settings.items()]

@@ -138,6 +138,17 @@ def make_shapes(library: str) -> tuple[Any, Any]:
     if library == "pyvista":
         pyvista = import_or_skip("pyvista")
         return pyvista.wrap(box), pyvista.PolyData(points)
+    if library == "trimesh scene":  # as `trimesh.load` gives, with a place for each of its meshes
+        moved = trimesh.transformations.translation_matrix((7, 8, 9))
+        scenes = trimesh.Scene(), trimesh.Scene()
+        for scene, shape in zip(scenes, (box.copy(), trimesh.PointCloud(points)), strict=True):
+            shape.apply_transform(np.linalg.inv(moved))
+            scene.add_geometry(shape, transform=moved)
+        return scenes
+    if library == "open3d tensors":
+        o3d = import_or_skip("open3d")
+        mesh, cloud = make_shapes("open3d")
+        return o3d.t.geometry.TriangleMesh.from_legacy(mesh), o3d.t.geometry.PointCloud.from_legacy(cloud)
     if library == "open3d":
         o3d = import_or_skip("open3d")
         mesh = o3d.geometry.TriangleMesh(
@@ -150,7 +161,7 @@ def make_shapes(library: str) -> tuple[Any, Any]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("library", ["numpy", "trimesh", "pyvista", "open3d"])
+@pytest.mark.parametrize("library", ["numpy", "trimesh", "trimesh scene", "pyvista", "open3d", "open3d tensors"])
 def test_parts_and_scans_of_other_libraries(library: str) -> None:
     part, scan = make_shapes(library)
     result = damageest.run(LEAST, part=part, scan=scan)
@@ -164,6 +175,13 @@ def test_parts_and_scans_of_other_libraries(library: str) -> None:
         ("box", "abc.ply", None),
         ("box", [["a", "b", "c"]], "scan: a list cannot be used (could not convert string to float"),
         ("box", SimpleNamespace(), "scan: a types.SimpleNamespace cannot be used"),
+        (
+            "box",
+            np.ones((9, 3), complex),
+            "of shape (9, 3) cannot be used (its numbers are complex)",
+        ),
+        ("box", np.ma.masked_equal(np.arange(27.0).reshape(9, 3), 4), "scan: 1 of its points are not finite"),
+        ("box", trimesh.Scene(), "scan: a trimesh.scene.scene.Scene cannot be used (nothing in it has vertices)"),
         (7, "points", "part: a int cannot be used (it has no vertices and faces); give a damageest Part, a trimesh"),
         ((np.zeros((3, 3)), np.zeros((1, 3))), "points", "its faces are no numbers of vertices"),
     ],
@@ -184,9 +202,36 @@ def test_settings_are_taken_as_a_mapping(job: Path) -> None:
     assert damageest.run(job, settings=settings).tolerance == 0.5
 
 
-def test_settings_are_not_taken_as_one_text(job: Path) -> None:
-    with pytest.raises(InputError, match=r"settings: give a list, \['tolerance=0.5'\], or a mapping"):
-        damageest.run(job, settings="tolerance=0.5")
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"settings": "tolerance=0.5"}, "settings: give a list, ['tolerance=0.5'], or a mapping"),
+        ({"settings": 7}, "settings: give a list, ['tolerance=0.2'], or a mapping"),
+        ({"cache": "memory"}, "cache: a str cannot be used; give True, False or a damageest.MemoryCache"),
+        ({"progress": 5}, "progress: a int cannot be used; give a function of one damageest.Progress"),
+        ({"cancel": True}, "cancel: a bool cannot be used; give a threading.Event, or what has is_set()"),
+    ],
+)
+def test_an_argument_of_another_type_is_refused_before_the_work(job: Path, given: Any, message: str) -> None:
+    with pytest.raises(InputError) as caught:
+        damageest.run(job, **given)
+    assert message in str(caught.value)
+
+
+@pytest.mark.filterwarnings("always")
+def test_progress_that_fails_is_told_once_and_costs_no_run(job: Path) -> None:
+    told: list[damageest.Progress] = []
+
+    def fail(now: damageest.Progress) -> None:
+        told.append(now)
+        raise ValueError("the window is closed")
+
+    with pytest.warns(RuntimeWarning) as seen, pytest.raises(DamageestError, match=r"sites\.drop names site 9"):
+        damageest.run(job, settings={"sites.drop": [9]}, progress=fail)
+    assert [str(one.message) for one in seen] == [
+        "progress failed at part: ValueError: the window is closed; the run goes on, and it is not called again"
+    ]
+    assert len(told) == 1
 
 
 def test_the_public_names_are_listed() -> None:

@@ -15,7 +15,7 @@ from damageest.io.files import describe_no_file, resolve_path, working_folder
 from damageest.job import yamlfile
 from damageest.job.beforehand import find_late_faults
 from damageest.job.folders import describe_no_patches, may_be_patches
-from damageest.job.model import Header, Job, find_paths
+from damageest.job.model import GROUPS, Header, Job, find_paths
 from damageest.job.wording import describe_fault
 from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract
@@ -140,16 +140,15 @@ class _Check:
             self.add_fault(f"--set takes stage.option=value or field=value, not '{setting}'")
             return
         value, _ = yamlfile.parse(text, f"--set {setting}")
-        if len(keys) == 1 or keys[0] in STAGES:
+        known = (*STAGES, *GROUPS)
+        if len(keys) == 1 or keys[0] in known:
             self.overridden[tuple(keys)] = setting
         if len(keys) == 1:
             self.tree[keys[0]] = value
-        elif keys[0] not in STAGES:
-            self.add_fault(
-                f"--set {setting}: unknown stage{suggest(keys[0], STAGES)}; the stages are: {', '.join(STAGES)}"
-            )
+        elif keys[0] not in known:
+            self.add_fault(f"--set {setting}: unknown stage{suggest(keys[0], known)}; there are: {', '.join(known)}")
         else:
-            old = self.tree.get(keys[0], {})
+            old = self.tree.get(keys[0]) or {}
             old = old if isinstance(old, dict) else _spell_out(keys[0], old, self.registry)
             self.tree[keys[0]] = {**old, keys[1]: value}
 

@@ -59,6 +59,10 @@ class InspectChoice(Options):
     )
 
 
+GROUPS = ("sites", "scanner", "temperature", "inspect")
+"""Fields of the job beside its stages that have fields of their own."""
+
+
 class Header(Options):
     """The fields of a job that are not stages."""
 

@@ -16,7 +16,7 @@ from damageest.isolation.lost_threads import raise_lost
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.calls import call_guarded, run_stage
-from damageest.pipeline.stage_errors import locate_error
+from damageest.pipeline.stage_errors import locate_error, name_observer
 from damageest.pipeline.state import Candidate, FoundSite, JobState
 from damageest.pipeline.steps import GATHERED, Step
 from damageest.registry.contracts import DEFAULTS, Contract
@@ -270,8 +270,8 @@ def _tell(hook: Callable[..., Any], **what: Any) -> None:
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         of = f"stage {what['stage']}" if "stage" in what else f"step {what['step']}"
-        text = f"a plugin that observes {of} failed: {type(error).__name__}: {clean_message(error)}"
-        warnings.warn(text, RuntimeWarning, stacklevel=2)
+        who, said = name_observer(hook, error), f"failed: {type(error).__name__}: {clean_message(error)}"
+        warnings.warn(f"{who}, which observes {of}, {said}", RuntimeWarning, stacklevel=2)
 
 
 def _tell_nobody(hook: Callable[..., Any], **what: Any) -> None:

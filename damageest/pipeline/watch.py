@@ -5,13 +5,14 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
+import warnings
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar
 
-from damageest.errors import CancelledError, DamageestError
+from damageest.errors import CancelledError, DamageestError, clean_message, is_interrupt
 from damageest.pipeline.engine import Branch, Engine, Route
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import Step
@@ -52,14 +53,23 @@ class Teller:
     def __init__(self, to: Callable[[Progress], object], route: Route) -> None:
         self._to, self._names = to, set(list_names(route))
         self._done: set[str] = set()
+        self._has_failed = False
         self._began, self._thread = time.monotonic(), threading.get_ident()
 
     def _tell(self, stage: str, use: str = "", site: int = 0, part: str = "", share: float | None = None) -> None:
-        if threading.get_ident() != self._thread:
+        if self._has_failed or threading.get_ident() != self._thread:
             return  # a registry may be used by runs in several threads
         found = len(self._done & self._names) / max(len(self._names), 1)
         seconds = time.monotonic() - self._began
-        self._to(Progress(stage, use, site, part, min(found, 0.99) if share is None else share, seconds))
+        now = Progress(stage, use, site, part, min(found, 0.99) if share is None else share, seconds)
+        try:
+            self._to(now)
+        except Exception as error:
+            if is_interrupt(error):
+                raise KeyboardInterrupt from error
+            self._has_failed = True
+            said = f"progress failed at {stage}: {type(error).__name__}: {clean_message(error)}"
+            warnings.warn(f"{said}; the run goes on, and it is not called again", RuntimeWarning, stacklevel=2)
 
     @hookimpl
     def damageest_before_stage(self, stage: str, use: str, site: int) -> None:

@@ -198,7 +198,7 @@ def test_an_observer_that_exits_is_a_warning(site: Site, small_done: Path) -> No
 
     site.add("acme-bad", FAULTY)
     watcher = importlib.import_module("acme_bad").Watcher()
-    with pytest.warns(RuntimeWarning, match="a plugin that observes stage align failed: SystemExit"):
+    with pytest.warns(RuntimeWarning, match="the observer Watcher, which observes stage align, failed: SystemExit"):
         assert damageest.run(small_done, registry=Registry.discover([watcher]), output=True).sites
 
 

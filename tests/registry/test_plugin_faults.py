@@ -17,7 +17,7 @@ from typer.testing import CliRunner
 
 import damageest
 from damageest.cli import app
-from damageest.errors import PluginError
+from damageest.errors import DamageestError, PluginError
 from damageest.registry import Registry
 from tests import damaged_box
 from tests.registry.test_registry import GROWN, Site, site
@@ -138,6 +138,21 @@ def test_none_where_the_contract_has_none(site: Site, tiny_done: Path) -> None:
     done = CliRunner().invoke(app, ["run", str(tiny_done), "--set", "cluster=forgets"])
     assert done.exit_code == 1
     assert "gave a NoneType where its contract promises Sites" in " ".join(done.output.split())
+
+
+OBSERVING = """
+@hookimpl
+def damageest_before_stage(stage):
+    raise OSError("no disk for my log")
+"""
+
+
+def test_an_observer_that_fails_is_named_with_its_package(site: Site, tiny_done: Path) -> None:
+    site.add("acme-log", OBSERVING)
+    tiny_done.with_name("box.stl").write_bytes(b"solid nothing")
+    said = "acme-log, which observes stage part, failed: OSError: no disk for my log"
+    with pytest.warns(RuntimeWarning, match=said), pytest.raises(DamageestError):
+        damageest.run(tiny_done)
 
 
 def test_a_module_without_hooks_provides_nothing(site: Site) -> None:
