@@ -46,10 +46,15 @@ def ask_stranger(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
     return found
 
 
+def name_rule(rule: Rule) -> str:
+    """What a rule of a plugin is called in messages."""
+    return f"the rule {type(rule).__qualname__} ('{rule.code}') of {rule.owner}"
+
+
 def _tell_failed(rule: Rule, why: str) -> Reason:
     return Reason(
         RULE_FAILED,
-        f"a check could not be made: the rule {type(rule).__qualname__} ('{rule.code}') of {rule.owner} {why}",
+        f"a check could not be made: {name_rule(rule)} {why}",
         "contradicts",
         remedy=f"report it to the authors of {rule.owner}, or uninstall it",
     )

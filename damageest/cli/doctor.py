@@ -13,9 +13,10 @@ import typer
 
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._streams import keep_for_results, say
+from damageest.cli._trials import try_plugins
 
 if TYPE_CHECKING:
-    from damageest.registry import Registry
+    from damageest.result import Result
 
 LIBRARIES = ("GL", "EGL", "X11", "OpenGL")
 """Shared libraries that pictures, windows and some plugins load."""
@@ -41,7 +42,8 @@ scan:
 class Findings:
     """What was found. ``packages``: name to version, ``none`` where one is not installed. ``extras``: name to the
     command that installs it, empty where it is here. ``libraries``: name to file, empty where it is not found.
-    ``self_test``: what it gave. ``faults``: what does not work, with what to do."""
+    ``self_test``: what it gave. ``tried``: how many rules and formats of plugins were called on a small example.
+    ``faults``: what does not work, with what to do."""
 
     system: str
     python: str
@@ -52,6 +54,7 @@ class Findings:
     libraries: dict[str, str]
     plugins: list[str]
     self_test: str
+    tried: int
     faults: list[str]
 
 
@@ -80,7 +83,8 @@ def examine(quick: bool) -> Findings:
 
     registry = Registry.discover()
     faults = [f"{one.provider}: {one.reason}; try: {one.remedy}" for one in registry.broken]
-    told, fault = ("left out", "") if quick else _test()
+    told, fault, result = ("left out", "", None) if quick else _test()
+    count, wrong = try_plugins(registry, result, apart=True)
     names = dict.fromkeys(EXTRAS.values())
     return Findings(
         system=f"{platform.platform()}, {platform.machine()}",
@@ -92,41 +96,9 @@ def examine(quick: bool) -> Findings:
         libraries={name: find_library(name) or "" for name in LIBRARIES},
         plugins=[f"{one}" for one in registry.providers],
         self_test=told,
-        faults=[*faults, *([fault] if fault else []), *try_plugins(registry)],
+        tried=count,
+        faults=[*faults, *([fault] if fault else []), *wrong],
     )
-
-
-def try_plugins(registry: Registry) -> list[str]:
-    """What goes wrong with each rule and each writer of a plugin on a small example: facts of one site, and a box."""
-    from pathlib import Path
-    from tempfile import TemporaryDirectory
-
-    from manifold3d import Manifold
-
-    from damageest.artefacts import Evidence, Solid
-    from damageest.checks.verdict import ask_stranger
-    from damageest.errors import StageError
-    from damageest.geometry.solids import to_arrays
-    from damageest.registry.loading import OWN
-    from damageest.rules import RULE_FAILED, ScanFacts, SiteFacts
-    from damageest.stages.export import Body
-
-    site = SiteFacts(100.0, 40.0, 120.0, 200, 1.0, 2.0, Evidence(), (95.0, 105.0))
-    scan = ScanFacts(0.2, 0.3, "mm", noise=0.03, seen_area=2000.0)
-    faults = []
-    for rule in registry.rules:
-        reasons = ask_stranger(rule, site, scan) if rule.owner else []
-        faults += [f"{one.text}; try: {one.remedy}" for one in reasons if one.code == RULE_FAILED]
-    box = Body("box", Solid(*to_arrays(Manifold.cube((4, 3, 2)))), (200, 60, 50))
-    for name, writer in registry.writers.items():
-        if registry.formats[name].name == OWN or writer.document:
-            continue
-        with TemporaryDirectory(prefix="damageest-") as folder:
-            try:
-                writer.write(Path(folder), "box", [box], "mm")
-            except (StageError, OSError) as error:
-                faults.append(f"export: {error}")
-    return faults
 
 
 def _list_packages() -> dict[str, str]:
@@ -155,8 +127,9 @@ def _has(extra: str) -> bool:
     return all(find_spec(module) is not None for module, name in EXTRAS.items() if name == extra)
 
 
-def _test() -> tuple[str, str]:
-    """Runs a job with known truth. Gives what came of it, and what is wrong with that: empty where nothing is."""
+def _test() -> tuple[str, str, Result | None]:
+    """Runs a job with known truth. Gives what came of it, what is wrong with that, empty where nothing is, and the
+    result."""
     from pathlib import Path
     from tempfile import TemporaryDirectory
 
@@ -172,13 +145,14 @@ def _test() -> tuple[str, str]:
         job.write_text(JOB)
         trimesh.creation.box(SIZE).export(job.with_name("box.stl"))
         try:
-            volume = run(job).damage_volume
+            result = run(job)
         except DamageestError as error:
-            return "failed", f"the self-test failed: {error}"
+            return "failed", f"the self-test failed: {error}", None
+    volume = result.damage_volume
     told = f"damage volume {volume:.1f} mm³, true {true:.1f} mm³, {time.perf_counter() - begin:.1f} s"
     if abs(volume / true - 1) > ALLOWED:
-        return told, f"the self-test gave a wrong volume ({told}); install damageest anew, and report it"
-    return told, ""
+        return told, f"the self-test gave a wrong volume ({told}); install damageest anew, and report it", result
+    return told, "", result
 
 
 def _print(found: Findings) -> None:
@@ -191,5 +165,6 @@ def _print(found: Findings) -> None:
     for name, file in found.libraries.items():
         say(f"lib{name}: {file or 'not found; only pictures, windows and some plugins need it'}")
     say(f"self-test: {found.self_test}")
+    say(f"rules and formats of plugins tried: {found.tried}")
     for fault in found.faults:
         say(f"fault: {fault}")

@@ -9,7 +9,14 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from damageest.errors import DamageestError, StageError, clean_message, describe_shortage, is_interrupt
+from damageest.errors import (
+    DamageestError,
+    StageError,
+    clean_message,
+    describe_missing_library,
+    describe_shortage,
+    is_interrupt,
+)
 from damageest.isolation import at_work
 from damageest.stages.export import ExportedFiles, PathWriter, Writer
 
@@ -37,6 +44,31 @@ def guard_path_writer(name: str, writer: PathWriter, owner: str) -> PathWriter:
         write=guard("write", writer.write, _check_path_notes),
         check=guard("check", writer.check, lambda given, folder: ""),
     )
+
+
+def guard_conversion(name: str, convert: Callable[..., Any], owner: str) -> Callable[..., Any]:
+    """The same for what a result can be converted to. A ValueError may be the caller's."""
+    return partial(_convert, convert, f"the conversion '{name}' of {owner} ({_name_function(convert)})", owner)
+
+
+def _convert(convert: Callable[..., Any], called: str, owner: str, *values: Any) -> Any:
+    try:
+        return convert(*values)
+    except (DamageestError, ValueError):
+        raise
+    except BaseException as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        if known := describe_missing_library(error) or describe_shortage(error):
+            raise StageError(f"{called}: {known.message}", known.remedy, code=known.code) from error
+        text = f"{called} failed: {type(error).__name__}: {clean_message(error, 400)}"
+        raise StageError(text, f"report it to the authors of {owner}", code="faulty") from error
+
+
+def name_guarded(function: Any) -> str:
+    """What a function of a plugin's writer is called in messages; empty for one of damageest's own."""
+    is_guarded = isinstance(function, partial) and function.func is _call
+    return f"the writer {function.args[2]}" if is_guarded else ""
 
 
 def _guard(name: str, owner: str, hook: str, what: str, function: Any, check: Callable[[Any, Path], str]) -> Any:

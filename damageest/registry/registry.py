@@ -17,7 +17,7 @@ from pydantic import ValidationError
 from damageest.errors import InputError, PluginError, clean_message, describe_install, suggest
 from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
-from damageest.registry.guards import guard_path_writer, guard_writer
+from damageest.registry.guards import guard_conversion, guard_path_writer, guard_writer
 from damageest.registry.loading import OWN, Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.result import Conversion
 from damageest.rules import RULE_FAILED, Rule
@@ -91,6 +91,7 @@ class Registry:
                         added_paths = {
                             name: guard_path_writer(name, one, f"{provider}") for name, one in added_paths.items()
                         }
+                        converts = {name: guard_conversion(name, one, f"{provider}") for name, one in converts.items()}
             except BaseException as error:
                 broken.append(describe_broken(error, provider))
                 continue

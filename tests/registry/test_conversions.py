@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import damageest
-from damageest.errors import InputError
+from damageest.errors import InputError, StageError
 from damageest.registry import Registry
 from tests.registry.test_registry import Site, site  # noqa: F401 - a fixture
 
@@ -49,3 +49,23 @@ def test_a_kind_that_is_there_already_and_what_is_no_function_are_faults(site: S
     assert "converts to count, as another package does already" in broken["acme-again"]
     assert "did not give a mapping of names to functions" in broken["acme-wrong"]
     assert "x" not in registry.conversions
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("return result.volumes", "(acme_count.count) failed: AttributeError: 'NoneType' object has no attribute"),
+        ("import acme_kernel", "(acme_count.count): the Python module acme_kernel is not installed"),
+        ("raise SystemExit(3)", "(acme_count.count) failed: SystemExit: 3"),
+    ],
+)
+def test_a_faulty_conversion_is_named_with_its_package_and_function(
+    site: Site,  # noqa: F811
+    body: str,
+    message: str,
+) -> None:
+    source = COUNTED.replace("NAME", "'count'").replace("return len(result.mesh(what, site).faces)", body)
+    site.add("acme-count", source)
+    with pytest.raises(StageError) as caught:
+        Registry.discover().conversions["count"](None, "damage", 1)
+    assert f"the conversion 'count' of acme-count 1.2 {message}" in caught.value.message

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import tempfile
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -11,10 +12,11 @@ from manifold3d import Manifold
 
 import damageest
 from damageest.artefacts import Solid
-from damageest.cli.doctor import try_plugins
+from damageest.cli._trials import try_plugins
 from damageest.errors import JobError, StageError
 from damageest.geometry.solids import to_arrays
 from damageest.registry import Registry
+from damageest.result import Result
 from damageest.stages.export import Body
 from tests import damaged_box
 from tests.registry.test_registry import Site, site  # noqa: F401 - a fixture
@@ -115,4 +117,84 @@ def test_a_faulty_writer_is_named_with_its_package_function_and_hook(
     assert "'acme' of acme-cad 1.2 (acme_cad.write, its `write`, from the hook damageest_writers)" in str(caught.value)
     assert message in caught.value.message
     assert "authors of acme-cad 1.2" in caught.value.remedy
-    assert [fault for fault in try_plugins(registry) if "acme-cad 1.2" in fault and message in fault]
+    assert [fault for fault in try_plugins(registry)[1] if "acme-cad 1.2" in fault and message in fault]
+
+
+OTHER_WRITERS = """
+import numpy as np
+from damageest.stages.export import ExportedFiles, PathWriter, Writer
+
+def write(folder, stem, bodies, unit):
+    (folder / f"{stem}.acme").write_text(unit)
+    return ExportedFiles((f"{stem}.acme",))
+
+def patch(path, name, patch, unit):
+    return len(patch.poles)
+
+def document(folder, result):
+    return ExportedFiles((f"{result.sites[0].serial}.txt",))
+
+def write_path(file, path, settings):
+    file.write_text(str(path.points.speed))
+
+def refuse(file, path, settings):
+    raise StageError("this control needs a machine", "a machine file")
+
+@hookimpl
+def damageest_writers():
+    return {"acme": Writer(write, patch=patch), "acme-all": Writer(write, document=document)}
+
+@hookimpl
+def damageest_path_writers():
+    return {"acme-path": PathWriter(write_path, "nc"), "acme-robot": PathWriter(refuse, "src")}
+"""
+
+
+def test_doctor_calls_every_function_of_a_writer(site: Site, small_result: Result) -> None:  # noqa: F811
+    """Splines, documents and paths too; a format of paths may refuse one without a machine."""
+    site.add("acme-cad", "from damageest.errors import StageError" + OTHER_WRITERS)
+    registry = Registry.discover()
+    own = dict.fromkeys(name for name in registry.writers if name.startswith("acme"))
+    paths = {name: one for name, one in registry.path_writers.items() if name.startswith("acme")}
+    lone = replace(registry, writers={name: registry.writers[name] for name in own}, path_writers=paths, rules=())
+    count, faults = try_plugins(lone, small_result)
+    assert count == 4
+    assert len(faults) == 3
+    for fault, told in zip(
+        sorted(faults), ["'acme' of acme-cad 1.2 (acme_cad.patch", "'acme-all' of", "'acme-path' of"], strict=True
+    ):
+        assert told in fault
+        assert "gave a int, and has to give a text" in fault or "failed: AttributeError" in fault
+
+
+ENDS = """
+from damageest.artefacts import Reason
+from damageest.rules import Rule
+
+class Ends(Rule):
+    code, meaning, threshold = "acme_ends", "ends", "always"
+    def ask(self, site, scan):
+        import os
+        os.abort()
+
+class Sound(Rule):
+    code, meaning, threshold = "acme_sound", "is sound", "never"
+    def ask(self, site, scan):
+        return []
+
+@hookimpl
+def damageest_rules():
+    return [Ends, Sound]
+"""
+
+
+@pytest.mark.slow
+def test_doctor_outlives_a_rule_that_ends_its_process(site: Site) -> None:  # noqa: F811
+    site.add("acme-ends", ENDS)
+    registry = Registry.discover()
+    rules = tuple(rule for rule in registry.rules if rule.owner)
+    count, faults = try_plugins(replace(registry, rules=rules, writers={}, path_writers={}), apart=True)
+    assert count == 2
+    (fault,) = faults
+    told = "the rule Ends ('acme_ends') of acme-ends 1.2: its process ended by an abort (SIGABRT); try: report it"
+    assert fault.startswith(told)
