@@ -270,7 +270,7 @@ def _tell(hook: Callable[..., Any], **what: Any) -> None:
         if is_interrupt(error):
             raise KeyboardInterrupt from error
         of = f"stage {what['stage']}" if "stage" in what else f"step {what['step']}"
-        who, said = name_observer(hook, error), f"failed: {type(error).__name__}: {clean_message(error)}"
+        who, said = name_observer(hook, error), f"failed: {type(error).__name__}: {clean_message(error, 400)}"
         warnings.warn(f"{who}, which observes {of}, {said}", RuntimeWarning, stacklevel=2)
 
 

@@ -68,7 +68,7 @@ class Teller:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
             self._has_failed = True
-            said = f"progress failed at {stage}: {type(error).__name__}: {clean_message(error)}"
+            said = f"progress failed at {stage}: {type(error).__name__}: {clean_message(error, 400)}"
             warnings.warn(f"{said}; the run goes on, and it is not called again", RuntimeWarning, stacklevel=2)
 
     @hookimpl

@@ -215,7 +215,7 @@ def test_an_observer_that_raises_is_a_warning_whatever_it_raises(error: str, sit
         "from damageest.registry.hookspecs import hookimpl\n" + WATCHER.format(error=error)
     )
     watcher = importlib.import_module("acme_watch").Watcher()
-    with pytest.warns(RuntimeWarning, match=f"observes stage align failed: {error}") as told:
+    with pytest.warns(RuntimeWarning, match=f"observes stage align, failed: {error}") as told:
         assert damageest.run(tiny_done, registry=Registry.discover([watcher])).status == "ok"
     assert all("\x1b" not in str(one.message) and len(str(one.message)) < 3 * MOST_TEXT for one in told)
 
