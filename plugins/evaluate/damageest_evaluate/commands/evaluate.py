@@ -17,6 +17,7 @@ from damageest_evaluate.commands import (
     family,
     honesty,
     inspections,
+    named,
     path,
     prepare,
     real,
@@ -40,6 +41,7 @@ app.command("difference")(difference.command)
 app.command("family")(family.command)
 app.command("honesty")(honesty.command)
 app.command("inspections")(inspections.command)
+app.command("named")(named.command)
 app.command("real")(real.command)
 app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)
