@@ -10,7 +10,9 @@ import pytest
 import trimesh
 
 from damageest.artefacts import Deposit
+from damageest.output.site_json import index_files, report_site
 from damageest.result import Result
+from damageest.stages.export import ExportedFiles
 from tests.stages.export import results
 
 
@@ -80,3 +82,11 @@ def test_lost_metal_cut_back_and_stock_are_three_numbers(small_result: Result) -
     assert re.fullmatch(r"lost metal [0-9.]+ mm³, cut-back [0-9.]+ mm³, stock 7 mm³", cut.describe_volumes())
     opened = replace(small_result, sites=(replace(site, deposit=replace(deposit, milled=body), accepted=True),))
     assert opened.lost_volume == pytest.approx(small_result.damage_volume)
+
+
+def test_a_file_that_others_may_refuse_is_listed_and_is_not_the_sites_solid(small_result: Result) -> None:
+    (site,) = small_result.sites
+    names = [f"damage/site-{site.id}-invalid.step", f"surface/site-{site.id}.ply"]
+    told = report_site(site, ExportedFiles(tuple(names)), index_files(names)).files
+    assert (told.damage, told.surface) == (None, names[1])
+    assert told.every == names

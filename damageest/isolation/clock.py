@@ -26,6 +26,12 @@ class Clock:
         return self._entry.what
 
     @property
+    def told(self) -> str:
+        """What is at work, and the part of it that its code tells of."""
+        now = self._page.read()
+        return ": ".join(filter(None, (now.what, now.part)))
+
+    @property
     def used(self) -> float:
         """Processor seconds of the process until the last look."""
         return self._last - self._first

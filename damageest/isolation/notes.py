@@ -12,8 +12,8 @@ from typing import Any
 
 from damageest.isolation.transfer import make_shared_file
 
-_HEAD = struct.Struct("<IIdi?HH")
-"""Change, job, seconds, status, open, and the length of ``what`` and ``owner``, which follow."""
+_HEAD = struct.Struct("<IIdi?HHH")
+"""Change, job, seconds, status, open, and the length of ``what``, ``owner`` and ``part``, which follow."""
 _SIZE = 4096
 _PLACE = "damageest_place"
 """The attribute of an error that says what was at work."""
@@ -21,9 +21,10 @@ _PLACE = "damageest_place"
 
 @dataclass(frozen=True)
 class Entry:
-    """``what`` is at work, as "cluster: dbscan"; ``owner``: whose code it is; ``seconds``: its time limit, 0 for none.
+    """``what`` is at work, as "cluster: dbscan"; ``part``: of it, as the code tells; ``owner``: whose code it is;
+    ``seconds``: its time limit, 0 for none.
 
-    ``job`` counts from 0. ``count`` grows with each change. ``open`` until the process has ended by
+    ``job`` counts from 0. ``count`` grows with each change, but of the part. ``open`` until the process has ended by
     itself, then with an exit ``status``.
     """
 
@@ -34,6 +35,7 @@ class Entry:
     open: bool = True
     what: str = ""
     owner: str = ""
+    part: str = ""
 
 
 class Page:
@@ -51,17 +53,18 @@ class Page:
 
     def read(self) -> Entry:
         """The last entry."""
-        *head, length, other = _HEAD.unpack_from(self._data, 0)
-        start, end = _HEAD.size, _HEAD.size + length
-        what, owner = (part.decode(errors="replace") for part in (self._data[start:end], self._data[end : end + other]))
-        count, job, seconds, status, is_open = head
-        return Entry(count, job - 1, seconds, status, is_open, what, owner)
+        count, job, seconds, status, is_open, *lengths = _HEAD.unpack_from(self._data, 0)
+        texts, start = [], _HEAD.size
+        for length in lengths:
+            texts.append(self._data[start : start + length].decode(errors="replace"))
+            start += length
+        return Entry(count, job - 1, seconds, status, is_open, *texts)
 
     def write(self, entry: Entry) -> None:
         """Replaces the entry."""
-        what, owner = (text.encode()[: _SIZE // 3] for text in (entry.what, entry.owner))
+        texts = [text.encode()[: _SIZE // 4] for text in (entry.what, entry.owner, entry.part)]
         fixed = (entry.count % 2**32, entry.job + 1, entry.seconds, entry.status, entry.open)
-        data = _HEAD.pack(*fixed, len(what), len(owner)) + what + owner
+        data = _HEAD.pack(*fixed, *map(len, texts)) + b"".join(texts)
         self._data[: len(data)] = data
 
     def close(self) -> None:
@@ -117,6 +120,12 @@ def note_job(number: int) -> None:
     _change(job=number)
 
 
+def note_part(what: str) -> None:
+    """Notes which part of what is at work begins; its time goes on."""
+    if _own is not None:
+        _own.write(replace(_own.read(), part=what))
+
+
 def close_entry(status: int, seconds: float = 0.0) -> None:
     """Notes that the process ends by itself, with this exit status, within so many seconds."""
     _change(open=False, seconds=seconds, status=status)
@@ -125,4 +134,4 @@ def close_entry(status: int, seconds: float = 0.0) -> None:
 def _change(**values: Any) -> None:
     if _own is not None:
         now = _own.read()
-        _own.write(replace(now, count=now.count + 1, **values))
+        _own.write(replace(now, count=now.count + 1, part="", **values))

@@ -166,7 +166,7 @@ class WorkerProcess:
                 if clock and clock.is_exhausted():
                     raise Ended(clock.used)
                 if clock and watch:
-                    watch(clock.what)
+                    watch(clock.told)
 
     def interrupt(self) -> None:
         """Kills the process and what it started, from any thread; who waits for it finds that it has ended."""

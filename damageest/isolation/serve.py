@@ -20,8 +20,9 @@ from typing import Any
 
 from damageest.isolation import portable, transfer
 from damageest.isolation.limits import limited
-from damageest.isolation.notes import Page, find_place, note_on
+from damageest.isolation.notes import Page, find_place, note_on, note_part
 from damageest.isolation.parent import end_with_parent
+from damageest.isolation.telling import listen
 from damageest.isolation.transfer import load, receive, receive_parts, send
 
 is_plain = False
@@ -72,7 +73,7 @@ def _answer(channel: socket.socket) -> None:
     place, before = "", time.process_time()
     _reset_peak()
     try:
-        with limited(memory):
+        with limited(memory), listen(note_part):
             function, arguments = load(parts)
             del parts
             answer: tuple[str, Any] = ("value", function(**arguments))

@@ -53,7 +53,8 @@ def call_isolated(
     ``nested``: isolated calls of the function have processes of their own; without it they are ordinary calls.
     ``processor_time``: the time limits of what is noted are ones of processor time, since a busy machine is no reason
     to end it; so is that of ``limits`` then. ``tell`` gets what the call used; where the process was ended or crashed,
-    only if its processor time is limited. ``watch`` gets what is noted, about twice a second.
+    only if its processor time is limited. ``watch`` gets what is noted, and what the
+    function tells with `tell_part`, about twice a second.
 
     Raises StageError, most often ProcessError, where the process crashes or exits, or passes a limit.
     """

@@ -40,7 +40,9 @@ class FilesReport(JsonModel):
     surface: str | None
     deposit: str | None
     milled: str | None = Field(description="intact metal to be milled off before deposition; null without `prepare`")
-    every: list[str] = Field(description="all files of this site alone")
+    every: list[str] = Field(
+        description="all files of this site alone; the names of those that other programs may refuse end in -invalid"
+    )
 
 
 class SplineReport(JsonModel):
@@ -170,6 +172,7 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
     if not site.accepted:
         folders |= {"damage": "doubtful", "surface": "doubtful/surface"}
     own = {kind: files.get(f"{folder}/site-{site.id}", []) for kind, folder in folders.items()}
+    refused = {kind: files.get(f"{folder}/site-{site.id}-invalid", []) for kind, folder in folders.items()}
     return SiteReport.read(
         site,
         points=len(site.points),
@@ -179,7 +182,8 @@ def report_site(site: Site, written: ExportedFiles, files: Mapping[str, list[str
         deposit=_report_deposit(site),
         path=report_path(site, written),
         files=FilesReport(
-            **{kind: next(iter(own[kind]), None) for kind in kinds}, every=[f for kind in kinds for f in own[kind]]
+            **{kind: next(iter(own[kind]), None) for kind in kinds},
+            every=[f for kind in kinds for f in (*own[kind], *refused[kind])],
         ),
         spline=written.splines.get(site.id),
         exact=written.exact.get(site.id),

@@ -9,7 +9,7 @@ import time
 
 import numpy as np
 
-from damageest.isolation import at_work, call_isolated
+from damageest.isolation import at_work, call_isolated, tell_part
 
 
 def add(first: np.ndarray, second: np.ndarray) -> np.ndarray:
@@ -118,3 +118,10 @@ def use(size: int, seconds: float) -> None:
     end = time.process_time() + seconds
     while time.process_time() < end:
         held[0] += 1
+
+
+def tell_parts(seconds: float) -> None:
+    """One piece of work that tells its parts."""
+    with at_work("the deposit"):
+        tell_part("face 3")
+        time.sleep(seconds)

@@ -185,6 +185,13 @@ def test_a_limit_of_processor_time_holds_for_a_whole_call_of_many_parts() -> Non
     assert any(what.startswith("part ") for what in seen)
 
 
+def test_parts_that_are_told_in_the_process_reach_who_watches() -> None:
+    """They are no new work: its time limit goes on."""
+    seen: set[str] = set()
+    call_isolated(faults.tell_parts, {"seconds": 0.8}, worker="tests", watch=seen.add)
+    assert "the deposit: face 3" in seen
+
+
 def test_a_process_for_one_call_ends_with_it() -> None:
     import psutil
 

@@ -163,6 +163,10 @@ class Results:
         own = [item["path"] for item in self.content.get("provenance", {}).get("outputs", [])]
         return own or list(self.content["export"]["files"])
 
+    def tell_files(self) -> list[str]:
+        """The same as they are shown: those that may not be opened are marked."""
+        return [f"{name} (other programs may refuse it)" if "-invalid." in name else name for name in self.list_files()]
+
     def describe_deposits(self) -> list[str]:
         unit, lines = self.unit, []
         for site in self.content["sites"]:

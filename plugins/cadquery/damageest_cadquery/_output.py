@@ -110,7 +110,8 @@ def write_all(writing: Writing, rest: Sequence[Piece]) -> None:
             made, fault = writing.save(f"{place}{stem}", shape.name, [_move(shape, T, size)])
             here.update((stem, each) for each in made)
             if fault:
-                writing.faults[stem] = f"read back, {fault}"
+                was_read = fault != SPENT and fault not in request.skipped.values()
+                writing.faults[stem] = f"read back, {fault}" if was_read else fault
         union = (
             [_move(shape, T, size) for shape in _gather_lost(request, shapes)]
             if any(s.accepted for s in request.sites)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest.isolation import tell_part
 from damageest_cadquery._read import explore
 from damageest_cadquery._split import ShapeMap, is_opencascade_error, measure_volume
 from damageest_cadquery._tessellate import measure_diagonal
@@ -46,11 +47,14 @@ def list_faces(numbers: Iterable[int], names: Sequence[str]) -> str:
 
 @contextmanager
 def naming(faces: Iterable[int]) -> Iterator[None]:
-    """What fails within is about the stock on these CAD faces. An error of OpenCASCADE becomes a StockError."""
+    """What fails within is about the stock on these CAD faces, which is told. An error of OpenCASCADE becomes a
+    StockError."""
+    faces = tuple(sorted(set(faces)))
+    tell_part(f"face {', '.join(map(str, faces[:MOST_NAMED]))}{' …' if len(faces) > MOST_NAMED else ''}")
     try:
         yield
     except StockError as error:
-        error.faces = error.faces or tuple(sorted(set(faces)))
+        error.faces = error.faces or faces
         raise
     except Exception as error:
         if not is_opencascade_error(error):

@@ -23,7 +23,7 @@ from damageest.errors import InputError
 from damageest.isolation import ProcessError
 from damageest.registry import Registry
 from damageest.result import Result
-from damageest.stages.export import ExactForm, ExportedFiles
+from damageest.stages.export import Body, ExactForm, ExportedFiles
 from damageest.stages.export.files import Files
 from tests.needs import import_for, needs_plugin
 
@@ -205,8 +205,10 @@ def test_what_was_found_and_written_survives_the_end_of_the_time(
 
     monkeypatch.setattr(exact, "call_isolated", use_up)
     monkeypatch.setattr(exact, "find_place", lambda _: f"spline for site {len(left)}")
-    told = exact.write_exact(tmp_path, done.result, {}, {"": None}, 60, 80)
+    bodies = {"damage/site-1": Body("damage", done.result.sites[0].damage, (9, 9, 9))}
+    told = exact.write_exact(tmp_path, done.result, bodies, {"": None}, 60, 80)
     assert left == [80, 40]
+    assert any(note.startswith("result.step was not written: the time") for note in told.warnings)
     assert told.files == ("damage/site-1.step",)
     assert {number: form.form for number, form in told.exact.items()} == {
         1: "planes", **{site.id: "none" for site in done.result.sites[1:]}

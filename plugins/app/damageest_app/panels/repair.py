@@ -201,7 +201,7 @@ class RepairPanel(Panel):
     def result(self) -> None:
         results = self.session.results
         self.state.deposits = results.describe_deposits() if results else []
-        self.state.result_files = results.list_files() if results else []
+        self.state.result_files = results.tell_files() if results else []
         self.path.result()
 
     def draw(self, scene: Scene) -> None:
