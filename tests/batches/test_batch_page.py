@@ -91,3 +91,32 @@ def test_many_rows_in_a_browser(count: int, chromium: Any, tmp_path: Path) -> No
         window.click("th[data-key=seconds] button")
     assert lines.first.inner_text().split("\t")[1] == last
     assert not faults
+
+
+@pytest.mark.slow
+def test_it_fits_a_phone_and_paper(chromium: Any, tmp_path: Path) -> None:
+    """However long names and paths are; no word of a table is cut, and paper has all rows."""
+    good = {"verdicts": {"proven": 1, "doubtful": 2}, "damage_volume": 12345.6, "volume_95": (12300.0, 12400.0)}
+    names = [f"turbine_blade_stage_3_serial_{k:05d}_before_repair" for k in range(120)]
+    rows = [
+        Row(name, "job.yaml", str(tmp_path / name), "ok", seconds=9.0, units="mm", sites=3, **good) for name in names
+    ]
+    gone = f"/share/{'long-folder/' * 12}scan_of_the_part.ply: there is no such file; give another path"
+    rows[3] = Row("gone", "job.yaml", str(tmp_path / "gone"), "refused", error=gone)
+    write_page(rows, tmp_path)
+    window = chromium.new_page()
+    window.goto((tmp_path / "batch.html").as_uri())
+    window.wait_for_selector("tbody tr")
+    size = "[document.documentElement.scrollWidth, document.documentElement.clientWidth]"
+    for width in browser.WIDTHS:
+        window.set_viewport_size({"width": width, "height": 900})
+        shown = window.evaluate(size)
+        assert shown[0] <= shown[1], width
+        assert window.evaluate(browser.BROKEN) == [], width
+    window.emulate_media(media="print")
+    window.set_viewport_size({"width": 688, "height": 1000})
+    window.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert window.locator("tbody tr").count() == len(rows)
+    assert window.evaluate(size)[0] <= 688
+    assert window.evaluate(browser.BROKEN) == []
+    window.close()

@@ -255,20 +255,6 @@ def test_a_million_points(chromium: Any) -> None:
     check_drawn(report)
 
 
-BROKEN = """[...document.querySelectorAll('td, th')].filter(one => one.checkVisibility()).flatMap(cell => {
-  const found = [], walk = document.createTreeWalker(cell, NodeFilter.SHOW_TEXT);
-  while (walk.nextNode()) for (const word of walk.currentNode.data.matchAll(/[\\p{L}\\d.]+/gu)) {
-    const range = document.createRange();
-    range.setStart(walk.currentNode, word.index);
-    range.setEnd(walk.currentNode, word.index + word[0].length);
-    if (new Set([...range.getClientRects()].map(box => Math.round(box.top))).size > 1) found.push(word[0]);
-  }
-  return found;
-})"""
-"""The words of tables that go on in the next line, since their column is narrower than they are."""
-WIDTHS = (390, 1024, 1400, 2560)
-
-
 @pytest.fixture(scope="module")
 def twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The report of a part with twelve sites, one of them with a budget."""
@@ -278,15 +264,15 @@ def twelve(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def check_layout(chromium: Any, path: Path, sites: int) -> None:
     """The page is as wide as its window, breaks no word of a table, and prints on six pages and one a site."""
     report = browser.Shown(chromium, path)
-    for width in WIDTHS:
+    for width in browser.WIDTHS:
         report.page.set_viewport_size({"width": width, "height": 900})
         shown = report.page.evaluate("[document.documentElement.scrollWidth, document.documentElement.clientWidth]")
         assert shown[0] <= shown[1], width
-        assert report.page.evaluate(BROKEN) == [], width
+        assert report.page.evaluate(browser.BROKEN) == [], width
     report.page.emulate_media(media="print")
     report.page.set_viewport_size({"width": 688, "height": 1000})
     report.page.evaluate("dispatchEvent(new Event('beforeprint'))")
-    assert report.page.evaluate(BROKEN) == [], "on paper"
+    assert report.page.evaluate(browser.BROKEN) == [], "on paper"
     data = report.page.pdf(prefer_css_page_size=True)
     assert 1 <= len(re.findall(rb"/Type ?/Page\b", data)) <= 6 + sites
     report.page.close()
@@ -303,7 +289,7 @@ def test_a_word_that_its_column_cuts_is_found(chromium: Any) -> None:
     report = browser.Shown(chromium, pages.write(pages.two_sites()))
     report.page.add_style_tag(content="#sites th { max-width: 3ch; overflow-wrap: anywhere; width: 3ch }"
                               "#sites { table-layout: fixed; width: 200px }")  # fmt: skip
-    assert "verdict" in report.page.evaluate(BROKEN)
+    assert "verdict" in report.page.evaluate(browser.BROKEN)
     report.page.close()
 
 
