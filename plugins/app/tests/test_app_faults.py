@@ -21,7 +21,7 @@ from app_shop import make_job, write_plate
 
 import damageest
 from tests import damaged_box
-from tests.stages.report.browser import open_browser
+from tests.stages.report.browser import WIDTHS, open_browser
 
 pytestmark = [pytest.mark.slow, pytest.mark.timeout(300)]
 
@@ -211,3 +211,21 @@ def test_a_path_that_leaves_much_says_so_in_red_before_the_download(tmp_path: Pa
         r, g, b = (int(value) for value in re.findall(r"\d+", red)[:3])
         assert r > 150 > max(g, b), red
         assert page.page.locator(mark("download")).is_visible()
+
+
+BEYOND = """[...document.querySelectorAll('.v-btn, .v-field, .side, .stage, .head')]
+  .filter(one => one.checkVisibility()).map(one => [one.className, one.getBoundingClientRect()])
+  .filter(([, box]) => box.left < -1 || box.right > innerWidth + 1).map(([name]) => name)"""
+"""What stands beyond the window."""
+
+
+def test_it_fits_a_phone_and_wide_screens(shop: Path) -> None:
+    with open_app(shop) as page:
+        page.at_rest()
+        for width in WIDTHS:
+            page.page.set_viewport_size({"width": width, "height": 800})
+            for step in ("open", "prepare", "align", "judge", "repair", "several"):
+                page.click(f"step-{step}")
+                page.page.wait_for_timeout(100)
+                assert page.page.evaluate(BEYOND) == [], (width, step)
+                assert page.page.evaluate("document.documentElement.scrollWidth - innerWidth") <= 0, (width, step)
