@@ -19,6 +19,7 @@ import trimesh
 import damageest
 from damageest.errors import CancelledError, DamageestError, InputError
 from damageest.geometry.solids import to_manifold
+from damageest.io.given import as_scan
 from damageest.pipeline.notebook import show_in
 from damageest.result import Result
 from tests import damaged_box
@@ -166,6 +167,12 @@ def test_parts_and_scans_of_other_libraries(library: str) -> None:
     part, scan = make_shapes(library)
     result = damageest.run(LEAST, part=part, scan=scan)
     assert result.damage_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.1)
+
+
+def test_arrays_that_trimesh_watches_are_arrays() -> None:
+    cloud = trimesh.PointCloud(damaged_box.scan(100)).vertices
+    assert type(cloud).__module__.startswith("trimesh.")
+    assert np.array_equal(as_scan(cloud, "mm").points, cloud)
 
 
 @pytest.mark.parametrize(

@@ -96,7 +96,7 @@ def _take_legacy(value: Any) -> Any:
 def _join_scene(value: Any, field: str) -> Any:
     """The meshes, or point clouds, of a scene of trimesh as one, each where the scene places it: `trimesh.load` gives
     scenes. ``field``: what they must have."""
-    if not _name_kind(value).startswith("trimesh.") or not hasattr(value, "dump"):
+    if not _name_kind(value).startswith("trimesh.") or not hasattr(value, "graph"):
         return value
     import trimesh
 
