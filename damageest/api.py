@@ -123,7 +123,7 @@ def _check_types(cache: object, progress: object, cancel: object) -> None:
 
 
 def list_settings(settings: Sequence[str] | Mapping[str, Any]) -> Sequence[str]:
-    """Overrides as the command line takes them. Raises InputError for a text, whose letters they would be."""
+    """Overrides in the form of the command line. Raises InputError for a text."""
     if isinstance(settings, str) or not isinstance(settings, Iterable):
         shown = settings if isinstance(settings, str) else "tolerance=0.2"
         raise InputError(f'settings: give a list, [{shown!r}], or a mapping, for example {{"tolerance": 0.2}}')

@@ -161,7 +161,7 @@ class ModelFit:
 
     @property
     def name(self) -> str:
-        """The model in a few words."""
+        """The model as a short text."""
         if self.model == "scaled":
             return f"the scale is wrong by {100 * (self.scale - 1):+.3g} %"
         if self.model == "deformed":
@@ -218,10 +218,10 @@ def describe_volume(volume: float, interval: Interval | None) -> str:
 
 @dataclass(frozen=True)
 class BudgetRow:
-    """One source of a budget of uncertainty, as JCGM 100 has them: ``source``, ``text`` in words; ``type``: A, from the
-    scan by statistics, or B, from other knowledge. ``uncertainty``: standard uncertainty of the source, in ``unit`` (""
-    for a share); ``sensitivity``: change of the result for each unit of it; ``contribution``: standard uncertainty of
-    the result by it; ``share`` of the variance."""
+    """One source of a budget of uncertainty (JCGM 100): ``source``, and ``text`` for people; ``type``: A, from the scan
+    by statistics, or B, from other knowledge. ``uncertainty``: standard uncertainty of the source, in ``unit`` ("" for
+    a share); ``sensitivity``: change of the result for each unit of it; ``contribution``: standard uncertainty of the
+    result by it; ``share`` of the variance."""
 
     source: str
     text: str
@@ -236,7 +236,7 @@ class BudgetRow:
 
 @dataclass(frozen=True)
 class BudgetBound:
-    """What moves an end of the interval beyond the expanded uncertainty: ``low`` and ``high``, at most."""
+    """A bound that moves an end of the interval beyond the expanded uncertainty: ``low`` and ``high``, at most."""
 
     source: str
     text: str
@@ -273,18 +273,17 @@ class Fading:
 class Uncertainty:
     """How exactly a site's volume and its largest depth are known.
 
-    ``volume_95``, ``depth_95``: the 95 % intervals; None where no scan points lie on the inner surface. Causes, each
-    as one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points, between which the inner
+    ``volume_95``, ``depth_95``: the 95 % intervals; None where no scan points lie on the inner surface. Causes, each as
+    one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points, between which the inner
     surface is interpolated; ``rim``: where it meets the skin; ``pose`` as it was fitted; ``tessellation`` of the part;
-    ``form`` of skin that deviates over whole areas; ``adapt``: the field that the part was adapted by, which at this
-    site goes on for ``extrapolated`` beyond intact skin, where it is off by a standard deviation of
-    ``extrapolated_error`` at most; ``outward``: skin that lies as far outside; ``views`` that
-    differ.
-    ``free``: change of the volume at the ends of motions that the scan does not exclude. ``inside``, ``beside``: by how
-    much the loss may be larger at most where no points show the inner surface, and the skin beside it. ``fading``: None
-    for a loss that is not shallow. ``probing_form``, ``scanner``: by the scanner's certificate, and by its other
-    figures and the temperature together. ``budget``, ``depth_budget``: the same as tables; None where there is no
-    interval. ``certain``: volume of the piece that is lost also where the errors are a quarter larger.
+    ``form`` of skin that deviates over whole areas; ``adapt``: the adaptation of the part, extrapolated at this site by
+    ``extrapolated`` beyond intact skin, where its standard deviation is ``extrapolated_error`` at most; ``outward``:
+    skin that lies as far outside; ``views`` that differ. ``free``: change of the volume at the ends of motions that the
+    scan leaves free. ``inside``, ``beside``: by how much the loss may be larger at most where no points show the inner
+    surface, and the skin beside it. ``fading``: None for a loss that is not shallow. ``probing_form``, ``scanner``: by
+    the scanner's certificate, and by its other figures and the temperature together. ``budget``, ``depth_budget``: the
+    same as tables; None where there is no interval. ``certain``: volume of the piece that is lost also where the errors
+    are a quarter larger.
     """
 
     volume_95: Interval | None
@@ -312,7 +311,7 @@ class Uncertainty:
 
     @property
     def is_open(self) -> bool:
-        """Whether nothing that was seen limits how large the loss may be."""
+        """Whether the scan leaves the size of the loss without an upper limit."""
         return self.volume_95 is not None and math.isinf(self.volume_95[1])
 
 

@@ -39,12 +39,12 @@ class Site:
     """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
 
     After a cut-back alone, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and
-    what to deposit is not known. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices
-    into the scan; ``max_depth``: the farthest of them below the lost skin. ``accepted``: whether the site is part of
+    there is no deposit. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into the
+    scan; ``max_depth``: the farthest of them below the lost skin. ``accepted``: whether the site is part of
     `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
     unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
-    that is a whole body of the part. ``path``: the passes that build up the deposit; None where
-    the job asks for none, or none could be planned.
+    that is a whole body of the part. ``path``: the passes that build up the deposit; None where the job asks for none,
+    or none could be planned.
     """
 
     id: int
@@ -91,7 +91,7 @@ class Site:
         return np.asarray(centre + moment)
 
     def mesh(self, what: Literal["damage", "surface", "deposit"]) -> Mesh:
-        """The DV, the IDS, or what to deposit, which is the DV where there is no allowance. Raises ValueError."""
+        """The DV, the IDS, or the deposit, which is the DV without an allowance. Raises ValueError."""
         if what == "deposit" and self.refused:
             raise ValueError(f"site {self.id} has no deposit: the stage allowance refused it; see Result.failures")
         found = {"damage": self.damage, "surface": self.surface, "deposit": self.deposit or self.damage}
@@ -120,7 +120,7 @@ class StageRecord:
 
 @dataclass(frozen=True)
 class StepRecord:
-    """What a step between the stages took, without the stages that it called."""
+    """Time of a step between the stages, without the stages that it called."""
 
     step: str
     seconds: float
@@ -128,7 +128,7 @@ class StepRecord:
 
 @dataclass(frozen=True, eq=False)
 class SoFar:
-    """What a run had computed when an error ended it; None for what it had not come to. As in `Result`; ``result`` is
+    """The results of a run until an error ended it; None for values not yet computed. As in `Result`; ``result`` is
     whole where only files failed."""
 
     part: Part | None = None
@@ -211,12 +211,12 @@ class Result:
 
     @property
     def stock_volume(self) -> float:
-        """What the deposits of all accepted sites have beyond the part as designed."""
+        """Volume of the deposits of all accepted sites beyond the part as designed."""
         return sum(deposit.stock_volume for deposit in self._list_deposits())
 
     @property
     def lost_volume(self) -> float:
-        """The metal that is missing: ``damage_volume`` without the cut-back in it, where cavities are cut back."""
+        """The volume of missing metal: ``damage_volume`` without any cut-back."""
         within = [one.cut_back_volume for one in self._list_deposits() if one.milled is None and one.cavity is not None]
         return max(self.damage_volume - sum(within), 0.0)
 
@@ -284,7 +284,7 @@ class Result:
         return self.conversions[kind](self, what, site)
 
     def to_dict(self) -> dict[str, Any]:
-        """What ``result.json`` says of it, but for files and what only a run knows of them; see its schema."""
+        """The content of ``result.json``, without files and facts of the run; see its schema."""
         return dict(self.convert("dict", "result"))
 
     def save(self, folder: str | Path) -> Path:
@@ -312,8 +312,8 @@ class Result:
         return None if show is None else str(show(self, "result", None))
 
     def plot(self, site: int | None = None, show: bool = True) -> Any:
-        """Shows what is left of the part, the damage volumes and the scan in 3D, by PyVista: in a notebook within it,
-        elsewhere in a window. ``site``: look at this one. ``show``: False gives the ``pyvista.Plotter`` instead.
+        """Shows the remaining part, the damage volumes and the scan in 3D, by PyVista: in a notebook, else in a window.
+        ``site``: look at this one. ``show``: False gives the ``pyvista.Plotter`` instead.
 
         Raises StageError where PyVista is not installed: the extra `vtk` brings it.
         """
@@ -322,7 +322,7 @@ class Result:
 
     @property
     def transform_to_scan(self) -> Floats:
-        """(4,4) takes a point of the part to where the scanner saw it. Rigid, but where the lengths of the scan were
+        """(4,4) takes a point of the part to the scanner's frame. Rigid, but where the lengths of the scan were
         corrected: there it has their factor."""
         T = invert_pose(self.pose)
         if self.scan_factor != 1 and self.scan_centre is not None:

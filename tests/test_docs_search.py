@@ -30,7 +30,10 @@ QUESTIONS = {
     "how exact is it": ("accuracy.html", "IoU 0.993"),
     # of a repair engineer, of who brings a deposit to a machine, of an author of a plugin
     "how deep is the wear": ("sections.html#how-deep-the-wear-is", "deepest"),
-    "only one side was scanned": ("bad-scan.html#the-scan-has-holes-and-shadows", "Skin without points is never damage"),
+    "only one side was scanned": (
+        "bad-scan.html#the-scan-has-holes-and-shadows",
+        "Skin without points is never damage",
+    ),
     "hold the part by its datums": ("pose-and-wear.html#a-datum-system", "datum"),
     "is the repair good": ("inspect.html", "missing"),
     "STEP with the original faces": ("exact-step.html", "offset of the part's faces"),

@@ -16,9 +16,9 @@ from damageest.artefacts.poses import require_rigid
 
 @dataclass(frozen=True)
 class PriorUse(Checked):
-    """What other parts of the type said. ``parts``: how many; ``misfit``: what they leave on seen skin, root mean
-    square along the normals; ``limit``: from which a part counts as none of them; ``is_used``: whether the part was
-    predicted from them."""
+    """Prediction by other parts of the type. ``parts``: their number; ``misfit``: residual on seen skin, root mean
+    square along the normals; ``limit``: the misfit from which a part counts as another type; ``is_used``: whether the
+    part was predicted from them."""
 
     parts: int
     misfit: float
@@ -29,7 +29,7 @@ class PriorUse(Checked):
 
 @dataclass(frozen=True, eq=False)
 class AdaptedPart(Checked):
-    """The part as it was scanned but for its damage: the part as designed, deformed by a smooth field.
+    """The scanned part without its damage: the part as designed, deformed by a smooth field.
 
     ``part``: the deformed part, of V vertices. ``displacement`` (V,3): that of each vertex from the part as designed;
     over intact skin it has no rigid part. ``motion`` (4,4): rigid; takes the aligned scan onto the deformed part.

@@ -53,7 +53,8 @@ class Checked:
 
 
 def make_array(value: Any, dtype: Any, name: str) -> NDArray[Any]:
-    """A read-only array. Raises ArtefactError for values that ``dtype`` cannot hold, as -1 or 0.5 as a label."""
+    """A read-only array. Raises ArtefactError for values that ``dtype`` cannot hold, for example -1 or 0.5 as a
+    label."""
     try:
         given = np.asarray(value)
     except (ValueError, TypeError) as error:

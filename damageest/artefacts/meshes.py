@@ -85,8 +85,8 @@ def _find_bounds(points: Floats) -> Floats:
 
 
 def open_edges(faces: Ints) -> int:
-    """How many directed edges lack their opposite exactly once, or go from a vertex to itself; 0 for a closed,
-    consistently oriented 2-manifold."""
+    """Number of directed edges without exactly one opposite, or from a vertex to itself; 0 for a closed, consistently
+    oriented 2-manifold."""
     if not len(faces):
         return 0
     edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
@@ -130,7 +130,7 @@ class Solid(Mesh):
 
 @dataclass(frozen=True, eq=False)
 class Deposit(Solid):
-    """What is to be deposited for one damage, including stock to be milled off.
+    """The solid to deposit for one damage, including stock to be milled off.
 
     ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
     ``cut_back_volume`` the volume that this removes in addition. ``milled``: where the cavity was opened (`prepare`),

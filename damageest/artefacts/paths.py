@@ -169,7 +169,7 @@ class DepositPath(Checked):
 
     @property
     def reach(self) -> float:
-        """How far the farthest point of the nozzle is from the point that it works on."""
+        """Largest distance of a point of the nozzle from the point that it works on."""
         tool = self.nozzle.vertices + np.array([0.0, 0.0, self.standoff])
         return float(np.linalg.norm(tool, axis=1).max(initial=self.standoff))
 
@@ -230,7 +230,7 @@ class DepositPath(Checked):
 
     @property
     def surplus_volume(self) -> float:
-        """Volume that the passes add beyond what of the deposit is reached; 0 where they add less."""
+        """Volume that the passes add beyond the reached deposit; 0 where they add less."""
         return max(self.bead_volume - (self.deposit_volume - self.unreached_volume), 0.0)
 
     @property

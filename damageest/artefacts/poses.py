@@ -31,12 +31,11 @@ def require_rigid(name: str, poses: Floats) -> None:
 
 @dataclass(frozen=True)
 class FreeMotion(Checked):
-    """A motion that unworn skin does not exclude: after it the scan fits the part as well.
+    """A motion that unworn skin leaves free: after it the scan fits the part as well.
 
     ``direction``: unit vector of a shift, or of the axis of a turn through ``point`` (None: a shift), in the part's
-    frame. ``low``, ``high``: how far the scan can be moved, 0 being the pose found, in the job's unit; of a turn, the
-    movement of the skin that moves most. ``turn``: angle in radians for each unit of it, 0 for a shift. ``text``: the
-    same in words.
+    frame. ``low``, ``high``: ends of the motion, in the job's unit, 0 being the pose found; of a turn, the movement of
+    the skin that moves most. ``turn``: angle in radians for each unit of it, 0 for a shift. ``text``: the same as text.
     """
 
     direction: Vector
@@ -57,13 +56,13 @@ class FreeMotion(Checked):
 class DatumFit(Checked):
     """How one datum of a datum system was fitted to the scan, in the order of precedence.
 
-    ``name``: its letter. ``kind``: its shape, as "plane", or "3 cylinders" for a pattern. ``faces``: numbers of its CAD
-    faces, empty where the part is a mesh. ``takes``: the degrees of freedom that it fixes, as text in the part's frame.
-    ``points``: scan points on it; ``contact``: the share of them on the fitted shape, ``inside``: below it, as where it
-    is worn. ``rms``: of the means of patches in contact, in the job's unit. ``nominal`` and ``measured``: the radius of
-    each cylinder and sphere, in the job's unit. ``shapes``: the kind of each of its shapes, with ``places`` on it (a
-    plane's middle, on the axis, the apex, the centre), ``axes`` (a plane's outward normal; 0 for a sphere), and whether
-    it is a ``bores`` face, with the outside toward the axis.
+    ``name``: its letter. ``kind``: its shape, for example "plane", or "3 cylinders" for a pattern. ``faces``: numbers
+    of its CAD faces, empty where the part is a mesh. ``takes``: the degrees of freedom that it fixes, as text in the
+    part's frame. ``points``: scan points on it; ``contact``: the share of them on the fitted shape, ``inside``: below
+    it, for example by wear. ``rms``: of the means of patches in contact, in the job's unit. ``nominal`` and
+    ``measured``: the radius of each cylinder and sphere, in the job's unit. ``shapes``: the kind of each of its shapes,
+    with ``places`` on it (a plane's middle, on the axis, the apex, the centre), ``axes`` (a plane's outward normal; 0
+    for a sphere), and whether it is a ``bores`` face, with the outside toward the axis.
     """
 
     name: str
@@ -89,12 +88,11 @@ class DatumFit(Checked):
 class Pose(Checked):
     """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
 
-    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, as on a symmetric part: then the pose is
-    one of several right ones. ``notes`` say so in words. ``doubts``: what speaks against the pose, and so against every
-    site, as a small share of the scan on the part. Of those with the code `other_poses`, that poses fit which are no
-    symmetries, only sites are concerned whose metal is another one in them.
-    ``free``: motions that unworn skin does not exclude. ``is_held``: whether skin without wear holds the pose but for
-    those; False where that was not tested.
+    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, for example on a symmetric part: then the
+    pose is one of several right ones, and ``notes`` say so. ``doubts``: reasons against the pose, and so against every
+    site, for example a small share of the scan on the part. Of those with the code `other_poses`, that poses fit which
+    are no symmetries, only sites are concerned whose metal is another one in them. ``free``: motions that unworn skin
+    leaves free. ``is_held``: whether skin without wear holds the pose but for those; False where that was not tested.
     ``datums``: how the datums of a datum system were fitted, and ``left``: motions that they leave free and that the
     rest of the skin fixes, without a range. ``spread`` (6,K): the errors of a pose by datums, as columns of one
     standard deviation each: rotation about the middle of the part's bounds, in radians, then shift, in the job's unit;

@@ -19,11 +19,11 @@ _LITERAL = re.compile(r"\w+:|(pip|uv|damageest|python) ")
 
 @dataclass(frozen=True)
 class Reason:
-    """One thing that was found out. No code reads ``text``: it may be reworded at any time.
+    """One finding. No code reads ``text``: its wording may change at any time.
 
-    ``code``: a word that stays the same from version to version. ``amount``: its size in ``unit`` (as "mm", "mm³"; ""
-    for a share or a number); None where it has none. ``place`` (3,): where, in the part's frame. ``remedy``: what to
-    do about it; empty where nothing helps.
+    ``code``: a word that stays the same from version to version. ``amount``: its size in ``unit`` (for example "mm" or
+    "mm³"; "" for a share or a number), or None. ``place`` (3,): where, in the part's frame. ``remedy``: what to do;
+    empty where nothing helps.
     """
 
     code: str

@@ -112,7 +112,7 @@ class ConfidenceCount:
         )
         if self._without:
             text += f"; {self._without} points without confidence are used"
-        return (Reason("low_confidence", text, amount=self._low),)
+        return (Reason("low_confidence", text, amount=self._low, remedy="lower min_confidence if skin is missing"),)
 
 
 COARSE = 20_000

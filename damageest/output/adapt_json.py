@@ -45,7 +45,7 @@ class ExtrapolationReport(JsonModel):
 
 
 class PriorReport(JsonModel):
-    """What the job's other parts of the type said."""
+    """Prediction by the job's other parts of the type."""
 
     used: bool = Field(description="whether they predicted lost skin; false: this part deforms in another way")
     parts: int

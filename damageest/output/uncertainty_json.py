@@ -56,8 +56,8 @@ class FadingReport(JsonModel):
 
 class UncertaintyReport(JsonModel):
     """The causes. The first nine are standard deviations of the volume; `free`: its change at the ends of motions that
-    the scan does not exclude; the next two, how much larger it may be;
-    `probing_form` and `scanner` are standard deviations again."""
+    the scan leaves free; the next two, how much larger it may be; `probing_form` and `scanner` are standard deviations
+    again."""
 
     noise: float = Field(description="noise of the points on the inner surface")
     spacing: float = Field(description="surface between the points, above all beside the rim")

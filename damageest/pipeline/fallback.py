@@ -34,7 +34,7 @@ def fall_back(first: Route, second: Route, compares: bool = False) -> Branch:
             tried = follow(first, engine, state)
         except StageError as error:
             text = str(error).partition("\n")[0]  # its remedy is another method, and that is what follows
-            told = Reason("fell_back", f"method surface taken, since implicit failed: {text}")
+            told = Reason("fell_back", f"method surface used: implicit failed: {text}", remedy="set method: surface")
             tried = state.with_value(JobState.warnings, (*state.warnings, told))
         agreed = {cluster for site in tried.found if site.evidence.consistent for cluster in site.clusters}
         wanted = tuple(k for k in range(1, state.sites.count + 1) if compares or k not in agreed)

@@ -130,7 +130,9 @@ def set_specks_aside(
             depth = float(-deviation.distance[members].min())
             text = f"{error.place}, up to {depth:.3g} {unit} deep, are too few for a volume and were left out"
             place = find_place(aligned.points, members)
-            warnings.append(Reason("speck", text, amount=depth, unit=unit, place=place))
+            warnings.append(
+                Reason("speck", text, amount=depth, unit=unit, place=place, remedy="scan this place more densely")
+            )
         else:
             kept.append(error)
     return kept, warnings

@@ -50,8 +50,8 @@ def damageest_kinematics(machine: str, poses: Floats, turns: Floats) -> Floats |
 
 @hookspec
 def damageest_conversions() -> Mapping[str, Conversion]:  # type: ignore[empty-body]
-    """Gives what this plugin can convert a result to, by the name that `Result.convert` calls it by. The function gets
-    the result, what of it ("damage"), and the number of a site or None."""
+    """Gives the conversions of results by this plugin, by the name for `Result.convert`. The function gets the result,
+    what of it ("damage"), and the number of a site or None."""
 
 
 @hookspec
@@ -72,7 +72,7 @@ def damageest_before_stage(stage: str, use: str, site: int) -> None:
 
 @hookspec
 def damageest_part_begins(stage: str, use: str, site: int, what: str) -> None:
-    """Called when a stage tells which part of its work begins; few do. ``what``: in words, for a person."""
+    """Called when a stage names the part of its work that begins; few do. ``what``: text for a person."""
 
 
 @hookspec

@@ -53,9 +53,8 @@ class Implementation:
 @dataclass(frozen=True)
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
-    ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``:
-    the formats of paths, by name. ``conversions``: what a result can be converted to, by name. ``rules``: those that
-    give reasons for verdicts."""
+    ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``: the
+    formats of paths, by name. ``conversions``: of results, by name. ``rules``: those that give reasons for verdicts."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]

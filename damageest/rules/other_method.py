@@ -19,7 +19,7 @@ class OtherMethod(Rule):
         if site.other_volume is None or site.interval is None:
             return
         if math.isnan(site.other_volume):
-            yield Reason(self.code, "the other method gave no volume to compare it with")
+            yield Reason(self.code, "the other method gave no volume to compare it with", remedy=self.remedy)
             return
         low, high = site.interval
         is_within, unit = low <= site.other_volume <= high, f"{scan.unit}³"

@@ -50,7 +50,9 @@ def measure_line(number: int, place: Place, part: Mesh, points: Floats, spacing:
     contour = SectionContour(np.column_stack([along, zero]), np.column_stack([zero, zero + 1]), value, error, found)
     notes: tuple[str, ...] = ()
     if far > 2 * spacing:
-        notes = (f"the line is up to {far:.4g} off the skin; the depth is that of the nearest skin",)
+        notes = (
+            f"the line is up to {far:.4g} off the skin; the depth is that of the nearest skin; move the line there",
+        )
     seen = float(np.isfinite(value).mean())
     if not seen:
         notes = (*notes, "the scan does not show the part here")

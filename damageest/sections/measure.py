@@ -77,7 +77,7 @@ def _measure(number: int, place: Place, part: Mesh, scanned: Scanned, tolerance:
     if not outlines:
         heights = (part.vertices - place.origin) @ place.across
         gap = max(float(heights.min()), -float(heights.max()), 0.0)
-        beside = f"it passes beside the part, {gap:.4g} {scanned.unit} from it" if gap else "it meets no solid"
+        beside = f"it passes beside the part, {gap:.4g} {scanned.unit} from it; move it" if gap else "it meets no solid"
         return replace(empty, notes=(f"the plane does not cut the part: {beside}",))
     loops = [make_loop(outline, STEP * max(scanned.spacing, 1e-9)) for outline in outlines]
     longest = float(np.ptp(outlines[0], axis=0).max())
@@ -130,14 +130,18 @@ def _choose_kind(cut: Cut) -> tuple[str, tuple[str, ...]]:
     if asked in ("auto", "round") and find_round(cut.outlines[0], cut.deviation) is not None:
         return "round", ()
     if asked == "round":
-        return "contour", ("its outline as designed is no circle: no diameter was measured",)
+        return "contour", ("its outline as designed is no circle, so there is no diameter; take kind: contour",)
     lead = cut.find_leading()
     shape = measure_blade(cut.outlines[0], lead)
     if shape is not None and (asked == "blade" or is_blade(cut.outlines[0], shape)):
-        doubt = () if is_blade(cut.outlines[0], shape) else ("its outline as designed is hardly an aerofoil",)
+        doubt = (
+            ()
+            if is_blade(cut.outlines[0], shape)
+            else ("its outline as designed is hardly an aerofoil; take kind: contour if it is none",)
+        )
         return "blade", doubt
     if asked == "blade":
-        return "contour", ("its outline as designed is no aerofoil: no chord was measured",)
+        return "contour", ("its outline as designed is no aerofoil, so there is no chord; take kind: contour",)
     return "contour", ()
 
 

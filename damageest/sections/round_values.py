@@ -101,7 +101,11 @@ def _measure_circle(
         ends = np.flatnonzero(there)[[int(wave[there].argmin()), int(wave[there].argmax())]]
         both = float(np.linalg.norm(sum_errors(errors[ends], cut.correlated)))
         values.append(SectionValue(name, 0.0, float(np.ptp(wave[there])), float(np.hypot(both, extra)), note=seen))
-    notes = [] if on_circle.all() else [f"{prefix or 'outer outline '}is a circle but for a part, which is left out"]
+    notes = (
+        []
+        if on_circle.all()
+        else [f"{prefix or 'outer outline '}is a circle except for a piece that is left out, for example a groove"]
+    )
     return values, notes
 
 

@@ -98,8 +98,8 @@ class Stage(Options):
     use: str
 
     def leave_out(self, folder: Path) -> Self:
-        """The stage without what it would read from ``folder``, which the run writes anew. Raises InputError where
-        nothing is left of what it needs."""
+        """The stage without inputs from ``folder``, which the run writes anew. Raises InputError where a needed input
+        is missing then."""
         return self
 
     def find_selectors(self) -> list[tuple[tuple[str | int, ...], Selector]]:
@@ -122,9 +122,8 @@ class Stage(Options):
         return ""
 
     def find_faults(self, job: Mapping[str, Any], registry: Any) -> list[tuple[tuple[str | int, ...], str]]:
-        """What is wrong with the options that shows only beside the other stages of the ``job``, which are by their
-        names, or in the files that they name; each with its place below the stage's name. Called before anything is
-        computed, so that no work is lost. ``registry``: what is installed."""
+        """Faults of the options in view of the other stages of the ``job``, by name, or of files that they name; each
+        with its place below the stage's name. Called before anything is computed. ``registry``: what is installed."""
         return []
 
     @classmethod

@@ -10,8 +10,7 @@ from damageest.stages.adapt.smooth import Smooth
 class AutoAdapt(Smooth):
     """As `smooth`, but tried only where intact skin shows a bent, twisted, stretched or scaled part.
 
-    Where it does not, and where held-out patches of the scan do not bear the field out, the result is that of `none`,
-    byte for byte.
+    Otherwise, and where held-out patches of the scan contradict the field, the result is that of `none`, byte for byte.
     """
 
     use: Literal["auto"] = "auto"  # type: ignore[assignment]

@@ -46,11 +46,11 @@ SEEN = 4000
 
 
 class Smooth(Adapt):
-    """Deforms the part by a smooth field: bend, twist, scale, taper and what a cubic polynomial holds, then a lattice.
+    """Deforms the part by a smooth field: bend, twist, scale, taper and other cubic polynomials, then a lattice.
 
-    For parts that are bent, twisted, shrunk or made a little differently by more than the tolerance. It is fitted to
-    skin on both sides of the part; the strain of the metal is kept small, and a field is only freer where held-out
-    patches of the scan, and metal that stands out, are explained better by it. Wear and loss are inward only, and stay.
+    For parts that are bent, twisted, shrunk or made a little differently by more than the tolerance. The fit uses skin
+    on both sides of the part and keeps the strain of the metal small. A freer field has to explain held-out patches of
+    the scan, and metal outside the part, better. Wear and loss are inward only, and stay.
     """
 
     use: Literal["smooth"] = "smooth"

@@ -22,9 +22,9 @@ class Align(Stage, ABC):
 
     Returns:
         ``T_part_scan`` (4,4), a rotation and a translation without scale or mirror: x_part = R x_scan + t. ``rms`` and
-        ``inliers`` say how well it fits; ``alternatives`` (K,4,4) lists other poses that fit as well, as on a symmetric
-        part, and ``notes`` describe them. ``free`` and ``is_held`` are optional: motions that unworn skin does not
-        exclude, and whether that was tested.
+        ``inliers`` say how well it fits; ``alternatives`` (K,4,4) lists other poses that fit as well, for example on a
+        symmetric part, and ``notes`` describe them. ``free`` and ``is_held`` are optional: motions that unworn skin
+        leaves free, and whether that was tested.
 
     Raises:
         StageError: where no pose explains the scan, or it has too few points.
@@ -61,7 +61,7 @@ class Align(Stage, ABC):
 
     @property
     def moves_views(self) -> bool:
-        """Whether views of the scan that lie off the others are to be put right after it."""
+        """Whether misplaced views of the scan are corrected after it."""
         return False
 
     @property

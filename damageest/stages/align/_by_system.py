@@ -192,7 +192,7 @@ def _tell_decided(frame: Frame, patches: Patches, noise: float, tolerance: float
     named = "; ".join(f"{name_motion(one)} from {one.low:.3g} to {one.high:+.3g} {unit}" for one in decided)
     text = f"the datums decide between equally good poses: {named}; if a datum is worn, other metal is lost"
     amount = max(max(-one.low, one.high) for one in decided)
-    return (Reason("datum_decides", text, "note", amount, unit),)
+    return (Reason("datum_decides", text, "note", amount, unit, remedy="check these datums for wear"),)
 
 
 def _doubt_open(frame: Frame, patches: Patches, free: Floats) -> tuple[Reason, ...]:

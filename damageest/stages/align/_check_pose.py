@@ -78,7 +78,11 @@ class PoseCheck:
         if self.agreement >= DOUBTFUL_AGREEMENT:
             return ()
         text = f"only {self.agreement:.0%} of the scan near the part lies on it: another part or revision?"
-        return (Reason("another_part", text, "contradicts", self.agreement),)
+        return (
+            Reason(
+                "another_part", text, "contradicts", self.agreement, remedy="compare part and revision with the scan"
+            ),
+        )
 
     def build_error(self, remedy: str) -> StageError:
         """The error for a pose that is not acceptable."""

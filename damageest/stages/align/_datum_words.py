@@ -58,12 +58,13 @@ def describe_system(frame: Frame, system: DatumSystem, fits: Fits, free: Floats,
         elif fitted.inside > TOLD:
             notes.append(
                 f"{name}: {fitted.inside:.0%} of its points lie up to {depth:.3g} {unit} below its shape and count "
-                "as worn"
+                "as worn; name an unworn face if that is too much"
             )
     if free.shape[1]:
         many = f"{free.shape[1]} degrees" if free.shape[1] > 1 else "1 degree"
         notes.append(
-            f"the datums leave {many} of freedom: {_join(frame, free, unit)}; other skin fixes all but symmetries"
+            f"the datums leave {many} of freedom: {_join(frame, free, unit)}; other skin fixes all but symmetries; "
+            "name more datums to fix them"
         )
     return Told(tuple(datums), tuple(notes), tuple(doubts))
 

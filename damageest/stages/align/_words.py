@@ -48,7 +48,7 @@ def describe_open(frame: Frame, patches: Patches, datum: Flags, unit: str) -> tu
     named = "; ".join(
         name_motion(to_free_motion(frame, one, 0.0, 0.0, unit)) for one in simplify(left @ patches.basis.T)
     )
-    return (f"the datum does not fix {named}; other skin does",)
+    return (f"the datum does not fix {named}, but other skin does; name more skin in align.datum to fix it",)
 
 
 def simplify(twists: Floats) -> Floats:

@@ -41,17 +41,17 @@ Axes = Annotated[tuple[Axis, ...], AfterValidator(_check_axes)]
 
 
 class RegionWeight(StrictMapping):
-    """How much a region of the skin counts."""
+    """The weight of a region of the skin."""
 
     skin: Selector = Option(description="box, half_space, facing, faces, at, kind: skin of the region")
     weight: float = Option(ge=0, le=1000, description="relative to 1 outside all regions; 0: ignored")
 
 
 class Constrained(Align):
-    """Fits the pose from a given one by the allowed motions alone: shifts and turns along and about axes of the part.
+    """Fits a given pose by the allowed motions alone: shifts along axes of the part, turns about them.
 
     Points off the surface get less weight with each step, as in `icp`. For parts that a fixture holds in the other
-    directions, and for inspections whose plan says so.
+    directions, and for inspection plans that require it.
     """
 
     use: Literal["constrained"] = "constrained"

@@ -16,8 +16,7 @@ from damageest.stages.align._frame import RigidPose
 class Icp(Align):
     """Robust point-to-plane ICP on the part's triangles, from a rough pose (paper 3.1 step 3).
 
-    Unlike plain ICP it is not shifted by damage: points off the surface get less weight with each step, at the end
-    none.
+    Damage does not shift it: points off the surface get less weight with each step, at the end none.
     """
 
     use: Literal["icp"] = "icp"

@@ -17,8 +17,7 @@ from damageest.stages.align._frame import RigidPose
 class KnownPose(Align):
     """Uses the given pose, by default the identity, and fits nothing.
 
-    Where the scan does not lie on the part in that pose, or lies on it much better in a pose nearby, the pose is
-    refused.
+    Refuses a pose in which the scan does not lie on the part, or fits much worse than nearby.
     """
 
     use: Literal["none"] = "none"

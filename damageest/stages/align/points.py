@@ -34,7 +34,7 @@ def _check_pairs(pairs: tuple[tuple[Point, Point], ...]) -> tuple[tuple[Point, P
 class Points(Align):
     """Fits the pose to picked pairs of points, then to the part's triangles as `icp` does.
 
-    For scans that `register` finds no pose for, or too many. The pairs need not be exact: an error of a few percent of
+    For scans for which `register` finds no pose, or too many. The pairs need not be exact: an error of a few percent of
     the part's size is corrected by the fit.
     """
 

@@ -17,8 +17,8 @@ class Register(Align):
     """Finds the pose without an initial one, then fits it robustly to the part's triangles (paper 3.1 step 3).
 
     Candidate poses come from pairs of scan points with normals that match pairs on the part. All are refined and
-    scored, and the best are compared point by point with the poses that a symmetry of the part makes of them. It works
-    with a third of the metal missing, with a third of the surface unseen, with outliers and with added metal.
+    scored; the best are compared with their images under symmetries of the part. It works with a third of the metal
+    missing, with a third of the surface unseen, with outliers and with added metal.
     """
 
     use: Literal["register"] = "register"

@@ -31,8 +31,8 @@ off or of the deposit is a rounding error."""
 class Milling(Allowance):
     """Adds stock on the nominal surface, to mill off after deposition, and cuts back into intact metal.
 
-    The height of the stock may differ from skin to skin, and regions may be kept free. All lengths are in the job's
-    unit, all places in part coordinates.
+    Stock may have another height on chosen skin, and regions may be kept free. All lengths are in the job's unit, all
+    places in part coordinates.
     """
 
     use: Literal["milling"] = "milling"
@@ -189,20 +189,22 @@ def _describe_touching(conflicts: list[StockConflict], part: Part) -> list[str]:
     if not touching:
         return []
     near = ", ".join(f"{value:.4g}" for value in touching[0].points[0])
-    return [f"skin that touches an opposite wall, within the error of the triangles, gets no stock: near ({near})"]
+    return [
+        f"no stock on skin that touches an opposite wall, within the error of the triangles: near ({near}); check it"
+    ]
 
 
 def _describe_stock(thickness: tuple[float, float, float] | None, skins: list[Any]) -> list[str]:
     """What to say of stock that is nowhere as high as the options ask for."""
     if thickness is None:
-        return ["the options ask for no stock on the skin of this damage: the deposit ends at the nominal surface"]
+        return ["no stock on the skin of this damage: the deposit ends at the nominal surface; raise outer to mill it"]
     least = min(float(each.height[each.height > 0].min(initial=np.inf)) for each in skins)
     if thickness[2] >= least * (1 - 1e-6):
         return []
     if thickness[2] <= 1e-6 * least:
-        return ["the options ask for stock, but keep_out or metal leaves no room for any of it"]
-    text = f"the stock is nowhere as high as the options ask for: at most {thickness[2]:.4g} of {least:.4g}"
-    return [f"{text}; metal, other stock or keep_out ends it"]
+        return ["no room for any stock: keep_out or metal is in the way; make keep_out smaller"]
+    text = f"the stock is nowhere as high as wanted: at most {thickness[2]:.4g} of {least:.4g}"
+    return [f"{text}; metal, other stock or keep_out ends it; make keep_out smaller, or outer lower"]
 
 
 def _find_touched(part: Part, skins: list[Any]) -> tuple[int, ...]:

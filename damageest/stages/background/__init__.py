@@ -10,7 +10,7 @@ from damageest.stages import Stage, asked_by_name
 
 
 class Background(Stage, ABC):
-    """Makes the background: a closed mesh round the inner damage surface (IDS), the lost metal and the part near them
+    """Makes the background: a closed mesh around the inner damage surface (IDS), the lost metal and the part near them
     (paper 3.1 step 7). `enclose` joins the rims of the IDS to it.
 
     Args of ``run``, lengths in the job's unit, coordinates in the part's frame:

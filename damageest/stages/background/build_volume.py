@@ -16,9 +16,9 @@ from damageest.stages.background import Background
 class BuildVolume(Background):
     """A grid over the printer's build volume, the same for every part (paper 3.2).
 
-    Only the cells round the site are made; the background is the surface at the clearance from the part, cut to these
-    cells. For shops that repair many kinds of parts in one machine: it is set up once, and a part that does not fit
-    into the machine is refused.
+    It makes only the cells around the site; the background is the surface at the clearance from the part, cut to these
+    cells. For shops that repair many kinds of parts in one machine: set it up once; parts larger than the machine are
+    refused.
     """
 
     use: Literal["build_volume"] = "build_volume"

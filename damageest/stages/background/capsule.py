@@ -13,7 +13,7 @@ from damageest.stages.background._shape import ShapeBackground
 
 
 class Capsule(ShapeBackground):
-    """The cylinder with domed ends round the part (paper 3.2): for turned parts with rounded or tapered ends."""
+    """The cylinder with domed ends around the part (paper 3.2): for turned parts with rounded or tapered ends."""
 
     use: Literal["capsule"] = "capsule"
     axis: AxisOption = Field(

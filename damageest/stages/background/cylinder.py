@@ -13,7 +13,7 @@ from damageest.stages.background._shape import ShapeBackground
 
 
 class CylinderBackground(ShapeBackground):
-    """The cylinder round the part, larger by the clearance (paper 3.2): for parts turned on a lathe."""
+    """The cylinder around the part, larger by the clearance (paper 3.2): for parts turned on a lathe."""
 
     use: Literal["cylinder"] = "cylinder"
     axis: AxisOption = Field(

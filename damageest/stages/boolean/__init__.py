@@ -10,7 +10,7 @@ from damageest.stages import Stage, asked_by_name
 
 
 class Boolean(Stage, ABC):
-    """Intersects an enclosure with the part: what they have in common is the damage volume (paper 3.1 step 12).
+    """Intersects an enclosure with the part: the intersection is the damage volume (paper 3.1 step 12).
 
     Args of ``run``, both in the part's frame:
         solid: the watertight enclosure.

@@ -28,7 +28,7 @@ MAX_FOR_ALL = 200_000
 
 
 class Dbscan(Cluster):
-    """DBSCAN of the points labelled damage; clusters that noise can produce are left out."""
+    """DBSCAN of the points labelled damage, without clusters that noise can produce."""
 
     use: Literal["dbscan"] = "dbscan"
     eps: PositiveFloat | Literal["tolerance", "auto"] | None = Field(

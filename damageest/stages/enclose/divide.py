@@ -13,11 +13,11 @@ Side = Literal["auto", "smaller", "larger"]
 
 
 class Divide(Enclose):
-    """Divides the part along the damage surface, and the room up to the background by which of the two is nearer.
+    """Divides the part along the damage surface, and the space up to the background by the nearer of both pieces.
 
-    The wall between rim and background (paper 3.1 steps 8 to 11) is the surface that lies as far from the lost metal as
-    from what is left of the part. It neither crosses the part nor itself, so it does for every background, for rims in
-    bores and grooves, and for walls worn through. It leaves the background as coarse as it is.
+    The wall between rim and background (paper 3.1 steps 8 to 11) is equally far from the lost metal and from the
+    remaining part. It crosses neither the part nor itself: it suits every background, rims in bores and grooves, and
+    walls worn through. It does not refine the background.
     """
 
     refines = True

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class Implicit(EncloseAll):
-    """A closed screened Poisson surface round each loss, solved in its neighbourhood only.
+    """A closed screened Poisson surface around each loss, solved in its neighbourhood only.
 
     For damage of any shape: several losses, worn-through walls, broken-off ends. It needs no rims and no background.
     """
@@ -66,8 +66,8 @@ class Implicit(EncloseAll):
             notes: tuple[str, ...] = ()
             if grid.cell > 2 * self.cell * tolerance:
                 notes = (
-                    f"this loss is large: it was solved in cells of {grid.cell:.3g}, {grid.cell / tolerance:.1f} "
-                    "tolerances",
+                    f"large loss: solved in cells of {grid.cell:.3g} ({grid.cell / tolerance:.1f} tolerances); raise "
+                    "enclose.most_cells for smaller ones",
                 )
             points, normals, areas = select_in_grid(gathered, grid)
             field = solve_coarse_to_fine(grid, points, normals, areas, self.screening)

@@ -13,7 +13,7 @@ from damageest.stages import Stage, asked_by_name
 
 @dataclass(frozen=True)
 class CadFace:
-    """A face of a CAD model. What does not apply to its kind of surface is None.
+    """A face of a CAD model. Values that do not apply to its kind of surface are None.
 
     ``number``, ``name``: as in `Part.faces_brep` and `Part.face_names`. ``kind``: of its surface, as in
     `Part.face_kinds`. ``area`` and ``centre``: of the face. ``normal``: of a plane, outward. ``axis``: direction of the
@@ -44,9 +44,9 @@ class CadDatum:
 
 @dataclass(frozen=True)
 class CadTolerance:
-    """A tolerance of a CAD file. ``kind``: as "flatness", "surface_profile", or "diameter" of a size. ``value``: the
-    width of its zone; None where it could not be read. ``faces``: numbers of CAD faces. ``datums``: letters of its
-    datum system, in the order of precedence. ``limits``: of a size."""
+    """A tolerance of a CAD file. ``kind``: for example "flatness", "surface_profile", or "diameter" of a size.
+    ``value``: the width of its zone; None where it could not be read. ``faces``: numbers of CAD faces. ``datums``:
+    letters of its datum system, in the order of precedence. ``limits``: of a size."""
 
     kind: str
     name: str
@@ -80,7 +80,7 @@ class ReadPart(Stage, ABC):
     Returns:
         A watertight part in ``unit``, in its own frame, which all later stages use. A reader of CAD files gives the
         number of each triangle's CAD face in ``faces_brep``, the faces' names and kinds, and in ``tessellation_error``
-        the largest distance between the CAD surface and the triangles. ``notes`` say what was repaired or converted.
+        the largest distance between the CAD surface and the triangles. ``notes``: repairs and conversions.
 
     Raises:
         InputError: where the file cannot be read, or is not a solid and cannot safely be made one. Begin the message

@@ -15,13 +15,13 @@ class Path(Stage, ABC):
     Args of ``run``, in the part's frame, lengths in the job's unit:
         body: the solid to build up, watertight: the deposit of the stage `allowance`, or the damage volume (DV).
         part: the part as designed.
-        left: what is left of the part without the cavities of all sites; None where nothing is left.
+        left: the part without the cavities of all sites; None where nothing is left.
         built: the deposits of the sites that are built up before this one, as one solid; None for the first.
         tolerance: the job's tolerance.
 
     Returns:
         None where no path is wanted. Else a `DepositPath`, whose passes do not touch ``left`` and ``built`` with the
-        nozzle. What it does not fill is listed there with its volume.
+        nozzle. It lists unfilled places with their volumes.
 
     Raises:
         StageError: where no path can be planned. The site then has none.

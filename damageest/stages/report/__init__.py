@@ -15,7 +15,7 @@ from damageest.stages import Stage, asked_by_name
 
 @dataclass(frozen=True)
 class ReportFiles(Checked):
-    """What a report wrote. ``files``: paths relative to the output folder. ``notes``: what was left out, and why.
+    """What a report wrote. ``files``: paths relative to the output folder. ``notes``: omissions, with reasons.
     ``picture``: a PNG of the part with its damage, for a table of many runs; empty where there is none."""
 
     files: tuple[str, ...] = ()

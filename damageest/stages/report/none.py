@@ -8,7 +8,7 @@ from damageest.stages.report import Report, ReportFiles
 
 
 class NoReport(Report):
-    """Writes no report. For many runs whose results are read by programs."""
+    """Writes no report. For many runs whose results programs read."""
 
     use: Literal["none"] = "none"
 

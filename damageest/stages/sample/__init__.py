@@ -12,8 +12,8 @@ from damageest.stages import Stage, asked_by_name
 class Sample(Stage, ABC):
     """Samples the part: points on all of its skin, with normals (paper 3.1 step 1).
 
-    It runs only where another implementation of the job takes its points, as `segment: cloud_distance` does. The
-    default route takes points near the damage alone, which the pipeline makes.
+    It runs only where another implementation of the job takes its points, for example `segment: cloud_distance`. The
+    default route takes points near the damage alone, made by the pipeline.
 
     Args of ``run``:
         part: the part as designed, in its own frame and the job's unit.

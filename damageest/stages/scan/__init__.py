@@ -17,8 +17,8 @@ class ReadScan(Stage, ABC):
     """Reads the scan from files, or makes one.
 
     ``reads``: the file suffixes, in lower case with the dot, that an implementation with an option ``path`` reads. A
-    bare path in the job chooses the implementation by its suffix. The option ``crop`` belongs to every implementation;
-    it is applied to what ``run`` gives, so ``run`` leaves it alone.
+    bare path in the job chooses the implementation by its suffix. Every implementation has the option ``crop``; the
+    pipeline applies it to the output of ``run``.
 
     Args of ``run``:
         unit: the job's unit, one of um, mm, cm, m, in, ft.
@@ -32,7 +32,7 @@ class ReadScan(Stage, ABC):
 
     Raises:
         InputError: where a file cannot be read or holds no points. Begin the message with the file's name.
-        StageError: where a virtual scanner cannot scan what it is asked to.
+        StageError: where a virtual scanner cannot scan the part as its options say.
 
     Example::
 
@@ -83,6 +83,6 @@ class ReadScan(Stage, ABC):
         return iter(())
 
     def read_otherwise(self, unit: str) -> Iterator[Scan]:
-        """The same files as they may be meant besides, where they leave open what they mean, as text whose columns
-        nothing names; ``columns`` of each scan says how. The pipeline asks where the scan is not of the part's size."""
+        """Other readings of ambiguous files, for example of text without named columns; ``columns`` of each scan says
+        which. The pipeline takes one where the scan has not the size of the part."""
         return iter(())

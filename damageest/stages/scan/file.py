@@ -136,10 +136,13 @@ class ScanFile(ReadScan):
             scan = replace(scan, notes=(*scan.notes, note))
             if others:
                 text = (
-                    f"{len(others)} files of the folder {folder.name} were not read, since scans have other formats: "
+                    f"{len(others)} files of the folder {folder.name} were not read: no format of scans: "
                     f"{name_files(others)}"
                 )
-                scan = replace(scan, warnings=(*scan.warnings, Reason("files_not_read", text, amount=len(others))))
+                note_others = Reason(
+                    "files_not_read", text, amount=len(others), remedy="convert them to PLY, or move them away"
+                )
+                scan = replace(scan, warnings=(*scan.warnings, note_others))
         return scan
 
     def read_pieces(self, unit: str) -> Iterator[Scan]:

@@ -20,7 +20,7 @@ from damageest.stages.scan.tools import AnyTool, RigidMatrix, SolidTool, Vector
 
 
 class Simulate(ReadScan):
-    """A virtual scanner: removes damage from the part with tools, then draws points on what is left.
+    """A virtual scanner: removes damage from the part with tools, then draws points on the rest.
 
     The scan's `truth` holds the true damage, added metal and pose. Lengths are in the job's unit, tools and scanners in
     the part's frame. With `scanners`, points are only where a straight line from a scanner reaches the surface. Without

@@ -288,7 +288,7 @@ def test_no_stock_at_all_is_noted() -> None:
     deposit = deposit_on(block(), CHIP)
     assert deposit.volume == pytest.approx(120)
     assert deposit.thickness is None
-    assert "ask for no stock" in deposit.notes[0]
+    assert "no stock on the skin" in deposit.notes[0]
 
 
 def test_stock_without_any_room_says_so() -> None:
@@ -296,4 +296,4 @@ def test_stock_without_any_room_says_so() -> None:
     deposit = deposit_on(block(), CHIP, **top, keep_out=[{"box": [[-9, -9, 12], [99, 99, 99]]}])
     assert deposit.stock_volume == pytest.approx(0, abs=1e-6)
     assert deposit.thickness == (0, 0, 0)
-    assert deposit.notes == ("the options ask for stock, but keep_out or metal leaves no room for any of it",)
+    assert deposit.notes == ("no room for any stock: keep_out or metal is in the way; make keep_out smaller",)

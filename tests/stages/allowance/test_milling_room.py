@@ -109,8 +109,8 @@ def test_stock_that_is_clipped_everywhere_has_the_thickness_of_the_room() -> Non
     deposit = deposit_on(comb(3.0), tool, targets=flanks, crowded="clip")
     assert deposit.stock_volume == pytest.approx(2 * 3 * 6 * 4, rel=1e-3)
     assert deposit.thickness == pytest.approx((3, 3, 3), abs=1e-3)
-    assert "nowhere as high as the options ask for: at most 3 of 3.5" in deposit.notes[1]
-    assert not any("ask for no stock" in note for note in deposit.notes)
+    assert "nowhere as high as wanted: at most 3 of 3.5" in deposit.notes[1]
+    assert not any("no stock on the skin" in note for note in deposit.notes)
 
 
 @pytest.mark.slow
@@ -120,7 +120,7 @@ def test_a_bore_that_stock_closes_is_filled_to_its_axis() -> None:
     deposit = deposit_on(bored(), tool, targets=[inward], crowded="clip")
     assert deposit.stock_volume == pytest.approx(np.pi * 5**2 * 3.9, rel=0.01)
     assert deposit.thickness == pytest.approx((5.5, 5.5, 5.5), rel=0.01)
-    assert "ask for no stock" not in " ".join(deposit.notes)
+    assert "no stock on the skin" not in " ".join(deposit.notes)
 
 
 def test_stock_between_two_damaged_walls_is_no_thicker_than_the_gap() -> None:
