@@ -43,7 +43,7 @@ def run(
     progress: Callable[[Progress], object] | None = None,
     cancel: Signal | None = None,
 ) -> Result:
-    """Runs a job and gives its result; writes nothing unless ``output`` says where (True: where the job says).
+    """Runs a job and gives its result; writes files only with ``output``: a folder, or True for the job's own.
 
     ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (`damageest.io.given.PARTS`: of numpy,
     trimesh, PyVista, Open3D) and ``scan`` (`damageest.io.given.SCANS`) replace the job's files; both may also be in the

@@ -28,7 +28,7 @@ _FIXED = ("metadata", "config", "serialization", "default", "expected", "functio
 
 
 def require_number(value: Any) -> Any:
-    """Refuses what Python or pydantic would read as a number, but a reader of the job file would not."""
+    """Refuses values that Python or pydantic would read as a number, but a reader of the job file would not."""
     # numpy's truth value by its name: this module is imported for --help, which needs no numpy
     is_numpy_bool = type(value).__module__ == "numpy" and type(value).__name__ in ("bool", "bool_")
     if is_numpy_bool or isinstance(value, (bool, str, bytes)):

@@ -90,7 +90,7 @@ def signed_volumes(vertices: Floats, faces: Ints, label: Ints, count: int) -> Fl
 
 def split_pinches(vertices: Floats, faces: Ints, notes: list[str]) -> tuple[Floats, Ints]:
     """The mesh (V,3), (F,3) with vertices of its own for each sheet where an even number of triangles, four or more,
-    meet at an edge, as where two cubes touch along an edge.
+    meet at an edge, for example of two cubes that touch along it.
 
     ``notes`` gets a line where this was done. A mesh that is closed already, or that cannot be closed so, is given back
     as it is.
@@ -114,8 +114,8 @@ def resolve_bodies(
 ) -> tuple[Floats, Ints]:
     """A mesh (V,3), (F,3) of the same bodies with faces outward, cavities inward and overlapping bodies united.
 
-    The mesh given must be closed, with consistent windings in each body. Which way a shell faces is decided by where it
-    lies, not by its windings: shells in no other one are bodies, those in a body are its cavities, those in a cavity
+    The mesh given must be closed, with consistent windings in each body. The position of a shell decides which way it
+    faces, not its windings: shells in no other one are bodies, those in a body are its cavities, those in a cavity
     bodies again. Bodies without volume are dropped. ``notes`` gets a line for each change, and one on separate bodies
     and cavities that are kept. ``gap``: how far the triangles may lie off the surface that they stand for: a union
     leaves no cavities that are thinner. ``outward``: the windings are those of a CAD kernel, where a shell in a body

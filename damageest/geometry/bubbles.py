@@ -16,8 +16,8 @@ EMPTY = 0.01
 def find_bubbles(body: Solid, metal: Callable[[], Any], part: Solid, origin: Floats) -> list[Any]:
     """The bubbles of ``body`` as Manifolds relative to ``origin`` (3,).
 
-    ``metal`` gives a Manifold of what is there beside it, as what is left of the part. The cavities that ``part`` was
-    designed with are no bubbles.
+    ``metal`` gives a Manifold of the metal beside it, for example the remaining part. Cavities of the design of
+    ``part`` are no bubbles.
     """
     cavities = [cavity for _, inside in split_shells(body) for cavity in inside]
     if not cavities:

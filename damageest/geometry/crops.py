@@ -35,7 +35,7 @@ class Crop(Options, ABC):
         """Whether each of the points (N,3) is inside the shape."""
 
     def describe(self) -> str:
-        """The crop in words: 'keep box'."""
+        """The crop as text: 'keep box'."""
         return f"keep {self.keep}"
 
 

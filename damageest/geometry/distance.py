@@ -59,7 +59,7 @@ def closest_on_mesh(points: Floats, mesh: Mesh) -> Closest:
 
 
 def keep_tree(mesh: Mesh) -> SurfaceTree:
-    """The tree of a mesh moved to the middle of its bounds, as it was prepared for an earlier question, or now."""
+    """The tree of a mesh moved to the middle of its bounds, from an earlier call or made now."""
     kept = _centred if len(mesh.faces) <= MOST_KEPT else _large
     if (tree := kept.get(mesh)) is None:
         tree = SurfaceTree(Mesh(mesh.vertices - mesh.bounds.mean(axis=0), mesh.faces))

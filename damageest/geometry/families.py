@@ -42,9 +42,9 @@ class Family:
 
 @dataclass(frozen=True, eq=False)
 class Errors:
-    """How well each part of a family is predicted from the others where some skin of it is hidden. ``beyond``
-    (P,N,3): by how much it is missed there, 0 elsewhere and where it was not seen itself. ``within``: root mean square
-    of what is left, along the normals, on skin that is not hidden."""
+    """Cross-validation of a family: each part predicted from the others where some skin of it is hidden. ``beyond``
+    (P,N,3): error of the prediction there, 0 elsewhere and on its own unseen skin. ``within``: root mean square
+    residual along the normals, on the other skin."""
 
     beyond: Floats
     within: float
@@ -112,7 +112,8 @@ def leave_one_out(family: Family, shown: Flags, normals: Floats) -> Errors:
 
 
 def widen(count: int) -> float:
-    """By how much a 95 % interval from the spread of so many parts is wider than from a known one (Student's t)."""
+    """Factor by which a 95 % interval from the spread of so many parts is wider than from a known spread (Student's
+    t)."""
     from scipy.stats import t
 
     return float(t.ppf(0.975, count - 1) / 1.96)

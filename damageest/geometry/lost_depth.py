@@ -82,8 +82,8 @@ class LostDepth:
     def measure(self, places: Floats) -> tuple[Floats, Floats]:
         """The depth (N,) of places (N,3) near the inner surface, and the outward normal (N,3) of the skin above each.
 
-        The least of the depths below skin on several sides, as at an edge. Where no skin is above, the distance to the
-        nearest.
+        The least of the depths below skin on several sides, for example at an edge. Where no skin is above, the
+        distance to the nearest.
         """
         if not len(self.below):
             distance, face, _ = closest_on_mesh(places, self.part)

@@ -30,7 +30,7 @@ def make_part(
     notes: tuple[str, ...] = (),
     cad_scale: float = 0.0,
 ) -> Part:
-    """A part from vertices (V,3) and faces (F,3), repaired where that is safe (see `damageest.geometry.healing`).
+    """A part from vertices (V,3) and faces (F,3), with safe repairs (see `damageest.geometry.healing`).
 
     Args:
         vertices: (V,3) in ``unit``, in the frame that becomes the part's.

@@ -17,7 +17,7 @@ NAMED = 3
 
 
 def name_nearest_skin(selector: Selector, part: Part) -> str:
-    """The CAD faces that come nearest to what is selected, the nearest first; of a mesh, the nearest place."""
+    """The CAD faces nearest to the selection, the nearest first; of a mesh, the nearest place."""
     short = measure_shortfall(selector, part)
     order = np.argsort(short, kind="stable")
     if part.faces_brep is None:
@@ -34,8 +34,7 @@ def name_nearest_skin(selector: Selector, part: Part) -> str:
 
 
 def measure_shortfall(selector: Selector, part: Part) -> Floats:
-    """(F,) by how much each triangle misses the conditions: distances in diagonals of the part, and turns in half
-    turns."""
+    """(F,) distance of each triangle from the conditions: lengths in diagonals of the part, and turns in half turns."""
     corners, short = part.triangles, np.zeros(len(part.faces))
     if selector.box is not None:
         low, high = np.array(selector.box)

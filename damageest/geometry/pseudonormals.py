@@ -128,7 +128,7 @@ class SignedMesh:
 
 
 def keep_signed_mesh(mesh: Mesh, vertices: Floats, faces: Ints, find_tree: Callable[[], Tree]) -> SignedMesh:
-    """The mesh as it was prepared by the last call, or now. ``vertices``, ``faces``, what ``find_tree`` gives: as of
+    """The prepared mesh, from the last call or made now. ``vertices``, ``faces``, what ``find_tree`` gives: as of
     `SignedMesh`."""
     if (found := _last.get(mesh)) is None:
         _last.clear()

@@ -109,7 +109,7 @@ _last: WeakKeyDictionary[Mesh, RayCaster] = WeakKeyDictionary()
 
 
 def prepare_rays(mesh: Mesh) -> RayCaster:
-    """The mesh prepared for rays, as by the last call or now; for the part, which several checks ask."""
+    """The mesh prepared for rays, from the last call or made now; for the part, which several checks need."""
     if (found := _last.get(mesh)) is None:
         _last.clear()
         found = _last[mesh] = RayCaster(mesh)

@@ -68,7 +68,7 @@ class Shape:
         return replace(self, point=(self.point - centre) / size, size=radius)
 
     def is_same(self, other: Shape, reach: float) -> bool:
-        """Whether two shapes are one, as the halves of a bore; ``reach``: largest distance between them."""
+        """Whether two shapes are one, for example the halves of a bore; ``reach``: largest distance between them."""
         if self.kind != other.kind or self.sign != other.sign:
             return False
         if self.kind == "sphere":
@@ -87,7 +87,7 @@ def recognise_shape(triangles: Floats, deviation: float = 0.0) -> Shape | None:
     """The simplest shape that all corners of triangles (F,3,3) lie on, which are counter-clockwise from outside. None
     where they lie on no plane, cylinder, cone or sphere, or have no area.
 
-    ``deviation``: by how much corners may be off besides.
+    ``deviation``: further permitted distance of corners.
     """
     cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     area = np.linalg.norm(cross, axis=1)

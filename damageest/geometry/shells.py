@@ -43,7 +43,7 @@ class Shells:
         self._depth = np.zeros(len(faces_out), np.int64)  # in how many others each one lies
 
     def relate(self, outward: bool) -> None:
-        """Finds what lies in what, and what touches. ``outward``: the windings are those of a CAD kernel."""
+        """Finds which shells lie in others, and which touch. ``outward``: the windings are those of a CAD kernel."""
         count = len(self.faces_out)
         pairs = self._list_near_pairs()
         if len(pairs) > MOST_PAIRS:

@@ -108,10 +108,10 @@ def unite(solids: Iterable[Mesh], origin: ArrayLike = (0.0, 0.0, 0.0)) -> Any:
 def subtract_lost(whole: Any, lost: Any) -> Any:
     """``whole`` minus ``lost``, which lies inside it: three Manifolds with one origin.
 
-    Where faces of the two coincide, as the outer faces of a damage volume do with those of the part, manifold3d 3.5 can
-    give a wrong difference without an error (one was an eighth too small). So the volumes are checked: the difference
-    is computed in up to three ways, and the first is taken that with ``lost`` adds up to the volume of ``whole`` within
-    BALANCE; if none does, the one with the smallest error.
+    Where faces of the two coincide, for example the outer faces of a damage volume with those of the part, manifold3d
+    3.5 can give a wrong difference without an error (one was an eighth too small). So the volumes are checked: the
+    difference is computed in up to three ways, and the first is taken that with ``lost`` adds up to the volume of
+    ``whole`` within BALANCE; if none does, the one with the smallest error.
     """
     nudge = 1e-9 * max(abs(bound) for bound in whole.bounding_box())
     ways: tuple[Callable[[], Any], ...] = (

@@ -30,8 +30,9 @@ def find_stacks(points: Floats) -> tuple[Ints, float] | None:
     """The number (N,) of the stack of each of the points (N,3), and the reach within which they are of one; None where
     the points lie in no stacks.
 
-    A stack is a group of points that is much narrower than the gap around it, as of repeated exposures, of copies in a
-    file, or of rounding. Points are in stacks where the distances to their neighbours, nearest first, jump after a few.
+    A stack is a group of points that is much narrower than the gap around it, for example from repeated exposures,
+    copies in a file, or rounding. Points are in stacks where the distances to their neighbours, nearest first, jump
+    after a few.
     """
     if len(points) < _FEWEST:
         return None

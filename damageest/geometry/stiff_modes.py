@@ -29,9 +29,9 @@ class StiffMode(NamedTuple):
 
 
 def name_modes(places: Floats, displacement: Floats) -> tuple[list[StiffMode], float]:
-    """The modes that a displacement (N,3) of places (N,3), spread evenly over skin, is a sum of, the largest first; and
-    the root mean square of what is none of them. Each is chosen as the one that explains most of what is left; all are
-    fitted together by least squares."""
+    """The modes of a displacement (N,3) of places (N,3), spread evenly over skin, the largest first; and the root mean
+    square of the rest. Each mode explains most of the remaining displacement; all are fitted together by least
+    squares."""
     if len(places) < 4:
         return [], 0.0
     even = np.ones(len(places))

@@ -20,7 +20,7 @@ AROUND = 0.4
 
 
 class Table(NamedTuple):
-    """A plane by its unit ``normal`` (3,), towards what stands on it, and its ``offset`` along that."""
+    """A plane by its unit ``normal`` (3,), towards the objects on it, and its ``offset`` along that."""
 
     normal: Floats
     offset: float

@@ -20,7 +20,7 @@ def count_cores() -> int:
 
 
 def count_threads() -> int:
-    """The threads to use: the cores of this process, or fewer where OMP_NUM_THREADS says so, as for one job of many."""
+    """The threads to use: the cores of this process, or fewer by OMP_NUM_THREADS, for example for one job of many."""
     cores = count_cores()
     with contextlib.suppress(ValueError):
         cores = min(cores, int(os.environ.get("OMP_NUM_THREADS", cores)))

@@ -60,9 +60,9 @@ def _separate(solid: Solid, radius: float, gap: float, rounds: int) -> Solid | N
 
 
 def separate_sheets(body: Any, origin: Floats, tolerance: float) -> Solid | None:
-    """A Manifold, relative to ``origin`` (3,), as a Solid that stays closed when vertices are merged, as in single
-    precision near the origin. Its shape changes by some `SHEET_GAP`, in tolerances, where it touches itself, in the
-    same way wherever it lies. None where it is empty; not changed where nothing helps."""
+    """A Manifold, relative to ``origin`` (3,), as a Solid that stays closed when vertices are merged, for example by
+    single precision near the origin. Its shape changes by some `SHEET_GAP`, in tolerances, where it touches itself, in
+    the same way wherever it lies. None where it is empty; not changed where nothing helps."""
     from damageest.geometry.solids import to_solid
 
     found = to_solid(body, origin)

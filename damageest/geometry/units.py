@@ -191,8 +191,8 @@ def diagnose_size(part_vertices: Floats, unit: str) -> str | None:
 
 
 def describe_size(points: Floats, unit: str, clip: float = 0.0) -> str:
-    """The size of points (N,3) along the axes of their frame, in words: '40 x 30 x 20 mm'; without the share ``clip``
-    of them at either end, as strays are."""
+    """The size of points (N,3) along the axes of their frame, as text: '40 x 30 x 20 mm'; without the share ``clip`` of
+    them at either end, such as strays."""
     if not len(points):
         return f"0 {unit}"
     low, high = np.quantile(points, [clip, 1 - clip], axis=0)

@@ -28,7 +28,7 @@ GRAZING = 0.1
 
 
 class View(NamedTuple):
-    """A place to look at: ``centre`` (3,), ``radius`` of what is to be seen, ``direction`` (3,) from there to the eye,
+    """A place to look at: ``centre`` (3,), ``radius`` of the visible region, ``direction`` (3,) from there to the eye,
     and ``up`` (3,)."""
 
     centre: Floats
@@ -38,7 +38,7 @@ class View(NamedTuple):
 
 
 def choose_view(left: RayCaster, surface: Mesh, bounds: Floats, scale: float, directions: Floats = DIRECTIONS) -> View:
-    """From where most of a damage ``surface`` is seen past what is ``left`` of the part, rather from above and askew.
+    """The view that shows most of a damage ``surface`` past the remaining part ``left``, rather from above and askew.
 
     ``bounds`` (2,3) of the damage; ``scale``: a length of which a thousandth is small.
     ``directions`` (K,3): unit vectors to the eye, to choose from.

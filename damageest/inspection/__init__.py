@@ -1,4 +1,4 @@
-"""Scans made after a step of a repair, compared with what the step was to give; and the record of the repair."""
+"""Scans made after a step of a repair, compared with the target of the step; and the record of the repair."""
 
 # The modules:
 # aim.py: target of a step

@@ -1,4 +1,4 @@
-"""What a part is to be like after a step of its repair."""
+"""Target of a part after a step of its repair."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Aim:
 
 
 def read_aim(folder: Path, step: Step) -> Aim:
-    """Reads what a run wrote, and puts together what the step is to give.
+    """Reads the output of a run, and builds the target of the step.
 
     Raises InputError where the folder is no result, was changed after the run, or has no repair.
     """
@@ -72,7 +72,7 @@ def read_aim(folder: Path, step: Step) -> Aim:
 
 
 def _read_nominal(output: OutputFolder, deposits: dict[int, Solid]) -> Solid:
-    """The part as the run took it: what is left of it, with all damage put back."""
+    """The part of the run: the undamaged metal united with all damage volumes."""
     undamaged = output.read_solid("undamaged")
     lost = [output.read_solid("damage", number) for number in deposits]
     if undamaged is None or any(body is None for body in lost):

@@ -1,4 +1,4 @@
-"""Compares a scan made after a step of a repair with what the step was to give.
+"""Compares a scan made after a step of a repair with the target of the step.
 
 The part as it is to be takes the place of the part as designed in a run: losses are what is missing, surplus is what is
 over. So coverage, evidence and intervals are those of every run.
@@ -34,11 +34,11 @@ DEFECT = 15.0
 
 @dataclass(frozen=True)
 class Question:
-    """What is asked of an inspection. ``tolerance``: None: that of the run before. ``same_setup``: the part was not
+    """The settings of an inspection. ``tolerance``: None: that of the run before. ``same_setup``: the part was not
     moved between the scans, and has the pose of the first one. ``defect``: width of the least defect that matters;
     None: `DEFECT` tolerances. ``elsewhere``: whether what is found at no site decides on the part, or is only listed.
-    ``fixtures``: boxes in the part's frame, with ``min`` and ``max``, in which points are no part's.
-    ``scan_unit``: of the file; None: as in the job. ``part_temperature``: at this scan, in °C; None: as in the job.
+    ``fixtures``: boxes in the part's frame, with ``min`` and ``max``, in which points are no part's. ``scan_unit``: of
+    the file; None: as in the job. ``part_temperature``: at this scan, in °C; None: as in the job.
     """
 
     tolerance: float | None = None

@@ -77,8 +77,8 @@ def shorten_error(error: BaseException) -> str:
 
 
 def raise_environment_fault(error: BaseException) -> None:
-    """Raises what is not the fault of the file that is read: an interrupt, a library that does not load, and errors
-    that damageest raised on purpose. A reader calls this before it says that a file is not readable."""
+    """Raises errors that are not the fault of the file: an interrupt, a library that does not load, and errors that
+    damageest raised on purpose. A reader calls this before it reports an unreadable file."""
     if is_interrupt(error):
         raise KeyboardInterrupt from error
     if isinstance(error, DamageestError):
@@ -168,7 +168,8 @@ def check_output_folder(folder: Path, option: str) -> None:
 @contextmanager
 def moved_into_place(path: Path, option: str) -> Iterator[Path]:
     """Gives another name beside ``path``; the file that is written there takes its place when the block is done. One
-    that was there stays where the block fails. Raises JobError where it cannot be written, as on a full disk."""
+    that was there stays where the block fails. Raises JobError where it cannot be written, for example on a full
+    disk."""
     path = Path(os.path.realpath(path))  # a link stays one
     scratch = path.with_name(f".{path.stem}.partial{path.suffix}")
     try:

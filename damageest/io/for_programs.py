@@ -15,8 +15,8 @@ SCHEMA = 1
 
 
 def format_json(content: Mapping[str, Any]) -> str:
-    """One line: an object with ``schema`` first. Numbers that JSON has not, as infinity, become null; arrays, sets and
-    tuples lists, paths text."""
+    """One line: an object with ``schema`` first. Numbers that JSON lacks, such as infinity, become null; arrays, sets
+    and tuples lists, paths text."""
     return json.dumps({"schema": SCHEMA, **_plain(content)}, ensure_ascii=False)
 
 

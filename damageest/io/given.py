@@ -21,7 +21,8 @@ SCANS = (
 
 
 def as_part(value: Any, units: str) -> Part:
-    """A part from what a caller has, lengths in ``units``. Raises InputError for what is none of `PARTS`."""
+    """A part from an object of the caller, lengths in ``units``. Raises InputError for an object that is none of
+    `PARTS`."""
     if isinstance(value, Part):
         return value
     try:
@@ -32,7 +33,8 @@ def as_part(value: Any, units: str) -> Part:
 
 
 def as_scan(value: Any, units: str) -> Scan:
-    """A scan from what a caller has, lengths in ``units``. Raises InputError for what is none of `SCANS`."""
+    """A scan from an object of the caller, lengths in ``units``. Raises InputError for an object that is none of
+    `SCANS`."""
     if isinstance(value, Scan):
         return value
     try:

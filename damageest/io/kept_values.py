@@ -18,7 +18,8 @@ ARRAYS, REST = "result.npz", "result-values.json"
 
 
 def keep_value(folder: Path, value: Any, left_out: tuple[str, ...] = ()) -> None:
-    """Writes a dataclass of damageest without its fields ``left_out``. Raises TypeError for what cannot be kept."""
+    """Writes a dataclass of damageest without its fields ``left_out``. Raises TypeError for a value that cannot be
+    kept."""
     arrays: dict[str, Any] = {}
     rest = _encode(value, arrays, left_out)
     folder.mkdir(parents=True, exist_ok=True)

@@ -30,7 +30,7 @@ def read_mesh(path: Path) -> tuple[Floats, Ints, str | None]:
 
 
 def read_noted_mesh(path: Path) -> tuple[Floats, Ints, str | None, tuple[str, ...]]:
-    """The same, and notes of what was done to the faces."""
+    """The same, and notes on changes of the faces."""
     suffix = check_file(path, MESH_SUFFIXES, "a mesh")
     require_memory_for([path])
     if (divided := _divide(path, suffix)) is not None:

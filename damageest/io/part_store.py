@@ -61,7 +61,7 @@ def find_folder() -> Path | None:
 def recall(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
     """The arrays of an entry, else those that ``make`` gives, which are kept.
 
-    ``kind`` names what is computed, ``key`` is a digest of the part and of what was asked.
+    ``kind`` names the values, ``key`` is a digest of the part and of the options.
     """
     folder = find_folder() if _is_used.get() else None
     if folder is None:
@@ -79,7 +79,7 @@ def recall(kind: str, key: str, make: Callable[[], Arrays]) -> Arrays:
 
 @functools.cache
 def describe_code() -> str:
-    """A digest of the code and libraries that compute what is kept."""
+    """A digest of the code and libraries that compute the kept values."""
     root = Path(__file__).parent.parent
     sources = [path for folder in COMPUTED_BY for path in sorted((root / folder).rglob("*.py"))]
     return digest([path.read_bytes() for path in sources], [_find_version(name) for name in LIBRARIES])

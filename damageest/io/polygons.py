@@ -21,10 +21,10 @@ Polygons = tuple[Floats, Ints, Ints]
 
 
 def read_polygons(path: Path, suffix: str, triangles: bool = False) -> tuple[Floats, Ints, str] | None:
-    """Vertices (V,3), triangles (F,3) and a note of what was divided, empty where nothing was; None for other formats,
+    """Vertices (V,3), triangles (F,3) and a note on divided faces, empty where there are none; None for other formats,
     and, unless ``triangles``, for OBJ and PLY of triangles alone.
 
-    Raises InputError for a face that refers to no vertex, FormatError for what is not in the format.
+    Raises InputError for a face that refers to no vertex, FormatError for a file that is not in the format.
     """
     if suffix == ".obj" and not triangles and not _OWN_OBJ.search(path.read_bytes().replace(b"\\\n", b" ")):
         return None

@@ -59,7 +59,7 @@ def describe_values(sections: Sequence[Section], unit: str) -> str:
 
 
 def describe_stations(section: Section, unit: str) -> str:
-    """The stations of a section as CSV: where they are, and how far the scan is outside the part as designed there."""
+    """The stations of a section as CSV: their positions, and the deviation of the scan from the part as designed."""
     head = ("outline", f"along, {unit}", f"x, {unit}", f"y, {unit}", f"z, {unit}", f"deviation, {unit}",
             f"standard uncertainty, {unit}", "points")  # fmt: skip
     rows = []
@@ -87,9 +87,9 @@ def _to_csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 
 @dataclass(frozen=True)
 class Drawing:
-    """Lines and areas of a section on paper, y downward: ``size`` (2,) of it; ``times``: by how much deviations are
-    drawn larger; ``areas``: closed outlines as designed; ``lines``: by what they show, as `COLOURS` has it;
-    ``marks``: places by name; ``ruler``: its ends and its length as text."""
+    """Lines and areas of a section on paper, y downward: ``size`` (2,) of it; ``times``: exaggeration of deviations;
+    ``areas``: closed outlines as designed; ``lines``: by what they show, as `COLOURS` has it; ``marks``: places by
+    name; ``ruler``: its ends and its length as text."""
 
     size: tuple[float, float]
     times: float

@@ -32,7 +32,7 @@ class FreePose:
 
 @dataclass(frozen=True)
 class ScanFacts:
-    """What is known about the whole scan, in the job's ``unit``.
+    """Facts about the whole scan, in the job's ``unit``.
 
     ``noise``, ``spacing``: of its points. ``seen_area``: skin that the scan shows. ``is_fitted``: whether the pose was
     fitted to the scan, and no unworn skin is known to hold it. ``systematic``: standard deviation of the mean distances
@@ -63,24 +63,23 @@ class ScanFacts:
 
 @dataclass(frozen=True)
 class SiteFacts:
-    """What is known about one site, in the job's unit.
+    """Facts about one site, in the job's unit.
 
     ``volume``: of its damage volume (DV), and ``interval``: the 95 % interval of it with all terms of ``uncertainty``;
     None where there is none. ``area``: skin that its points cover; ``damage_area``: of the whole surface of the DV;
     ``count``: its scan points; ``typical`` and ``deepest``: median and 95th percentile of their depth below the skin.
     ``evidence``: DV against scan. ``by_rays``: whether rays passed through the metal that it removes. ``rim_unseen``:
     share of its rim beside skin that the scan does not show. ``two_sheets``: share of its points where the scan shows
-    another surface above them, on the skin; ``misplaced``: share of its points that a misplaced view explains
-    which was not moved; ``one_motion``: whether one motion of them all explains it; ``shifted``: the typical depth of
-    the sites of the scan that it explains. ``shallow``: number of shallow sites that are not much smaller.
-    ``elsewhere``: share of its depth that a motion explains which puts no other skin outside.
-    ``other_poses``: share of its skin that is not skin in another pose that fits as well.
-    ``free``: motions that the scan does not exclude. ``displaced``: numbers of the surplus as large as the loss,
-    ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that may be dented there, else 0.
-    ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no scan point shows, and
-    ``beyond_words``: how it was found. ``shut`` and ``turned``: shares of its inner surface that could be seen from
-    nowhere, and only from where the skin beside it was not seen. ``other_volume``: by the other method; None where
-    that was not asked, NaN where it gave none.
+    another surface above them, on the skin; ``misplaced``: share of its points that a misplaced view explains which was
+    not moved; ``one_motion``: whether one motion of them all explains it; ``shifted``: the typical depth of the sites
+    of the scan that it explains. ``shallow``: number of shallow sites that are not much smaller. ``elsewhere``: share
+    of its depth that a motion explains which puts no other skin outside. ``other_poses``: share of its skin that is not
+    skin in another pose that fits as well. ``free``: motions that the scan leaves free. ``displaced``: numbers of the
+    surplus as large as the loss, ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that
+    may be dented there, else 0. ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no
+    scan point shows, and ``beyond_words``: how it was found. ``shut`` and ``turned``: shares of its inner surface that
+    could be seen from nowhere, and only from where the skin beside it was not seen. ``other_volume``: by the other
+    method; None where that was not asked, NaN where it gave none.
     """
 
     volume: float

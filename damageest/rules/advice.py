@@ -22,7 +22,7 @@ MOST_NAMED = 3
 @dataclass(frozen=True)
 class Topic:
     """``word`` names it, ``title`` is its heading on the page. ``codes``: of the reasons that belong to it. ``text``:
-    what to do, in plain words. ``job``: the lines of a job that do it; empty where none do."""
+    what to do. ``job``: lines of a job for it; empty where there are none."""
 
     word: str
     title: str

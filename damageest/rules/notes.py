@@ -14,8 +14,8 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class RunCode:
-    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 about how it was scanned, 2 says what
-    was done. ``plural``: the name of many of them in one line; empty where each has its own line."""
+    """``meaning`` of a code; ``rank``: 0 may change a decision about the part, 1 one about the scan, 2 reports an
+    action. ``plural``: the name of many of them in one line; empty where each has its own line."""
 
     meaning: str
     rank: int
@@ -155,5 +155,5 @@ def cap_notes(notes: Sequence[str]) -> list[str]:
 
 
 def qualify_nothing(notes: Iterable[Reason]) -> str:
-    """What belongs after "no damage was found" where places were taken for errors of the scan; else empty."""
+    """The qualification of "no damage was found" where places count as errors of the scan; else empty."""
     return " that errors of the scan do not explain" if any(note.code == "below_noise" for note in notes) else ""

@@ -59,8 +59,8 @@ def scale_colours(values: NDArray[Any], largest: float | None = None) -> NDArray
 
 
 def find_unit(lines: Sequence[str]) -> tuple[str | None, str]:
-    """The unit that comments of a header name, as in 'units: mm', and the comment; None where none does, or where they
-    name several."""
+    """The unit that comments of a header name, for example 'units: mm', and the comment; None where none does, or where
+    they name several."""
     found: dict[str, str] = {}
     for line in lines:
         for word in _UNIT.findall(line):

@@ -1,4 +1,4 @@
-"""What the report says of sections: a table for each item of the job, and the drawings."""
+"""Sections in the report: a table for each item of the job, and the drawings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the report says and shows of each site."""
+"""Contents of the report for each site."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the report says of uncertainty, fit and free motions of a result."""
+"""Uncertainty, fit and free motions of a result in the report."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def list_fit(result: Result, words: Words) -> list[tuple[str, str]]:
 
 
 def list_freedom(result: Result) -> list[tuple[str, str]]:
-    """Motions of the part that the scan does not fix, in words."""
+    """Motions of the part that the scan leaves free, as text."""
     return [("", motion.text) for motion in result.pose.free]
 
 
