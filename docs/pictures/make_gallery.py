@@ -138,7 +138,7 @@ def draw(case: Case, folder: OutputFolder) -> None:
 def write(case: Case, entry: Entry) -> str:
     """The section of a case."""
     word = {"points": "the scan, each site in a colour", "deviation": "the scan by its distance to the skin"}
-    right = {"damage": "the damage volumes in what is left", "deposit": "what to deposit on what is left"}
+    right = {"damage": "the damage volumes in the remaining part", "deposit": "the deposit on the remaining part"}
     alt = f"{word[case.looks[0]]}; {right[case.looks[1]]}"
     lines = [
         f"## {case.title}",

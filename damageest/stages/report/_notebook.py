@@ -37,7 +37,7 @@ def make_snippet(result: Result) -> str:
     largest = sorted(result.sites, key=lambda site: -site.damage.volume)[:MOST_DRAWN]
     drawings = _draw_sections(result, largest) if largest else [("how far intact points are", draw_histogram(result))]
     picture = _draw_picture(result) if result.sites and find_spec("PIL") is not None else ""
-    figures = [*([("all sites, in what is left", picture)] if picture else []), *drawings]
+    figures = [*([("all sites, in the remaining part", picture)] if picture else []), *drawings]
     shown = "".join(
         f'<figure style="margin:0 12px 0 0;display:inline-block;width:300px;vertical-align:top">{image}'
         f'<figcaption style="color:#6a757d">{escape(caption)}</figcaption></figure>'
