@@ -57,7 +57,7 @@ def command(
 ) -> None:
     """Run many jobs at once, each in its own process. A failing job does not stop the batch.
 
-    Exit status 0: all jobs ran, whatever their verdicts; 1: some did not. After Ctrl-C the same command goes on.
+    Exit status 0: all jobs ran, whatever their verdicts; 1: some did not. After Ctrl-C, the same command continues.
     """
     from damageest.batches.run import Options, batch
     from damageest.cli import _interrupt

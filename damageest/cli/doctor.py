@@ -62,7 +62,8 @@ def command(
     as_json: AsJson = False,
     quick: Annotated[bool, typer.Option("--quick", help="Leave out the self-test, which takes some seconds.")] = False,
 ) -> None:
-    """Say what is installed, what is missing and whether a small run gives the right volume; exit status 1 if not."""
+    """Check the installation and the volume of a small run. Lists what is installed and what is missing; exit status 1:
+    a fault."""
     with keep_for_results(as_json):
         found = examine(quick)
     if as_json:

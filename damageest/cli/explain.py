@@ -30,7 +30,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Explain a reason, a refusal, an error or an exit status, and what to do."""
+    """Explain reasons, errors and exit statuses, and what to do."""
     with keep_for_results(as_json):
         entries = _collect()
     if words:

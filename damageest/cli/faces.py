@@ -22,7 +22,7 @@ def command(
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """List a part's CAD faces: number, name, kind, area, centre, and normal, or axis and radius."""
+    """List the CAD faces of a part. With number, name, kind, area, centre, and normal, or axis and radius."""
     end_with(lambda: _list_faces(part, units, as_json), as_json)
 
 

@@ -36,7 +36,7 @@ def command(
     force: Annotated[bool, typer.Option("--force", help="Overwrite an existing file.")] = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Write a commented job file with values measured from part and scan."""
+    """Write a job file with values measured from part and scan."""
     from damageest.cli.part import read_pmi
     from damageest.errors import Fault, JobError
     from damageest.io.files import moved_into_place

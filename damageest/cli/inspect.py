@@ -64,8 +64,8 @@ def command(
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Compare a scan made after a repair step with its target: missing and excess metal. Adds the result to the record
-    in OUT."""
+    """Compare a scan after a repair step with its target. Lists missing and excess metal, and adds the result to the
+    record in OUT."""
     asked: dict[str, Any] = {"tolerance": tolerance, "same_setup": same_setup, "defect": defect}
     asked |= {"scan_unit": scan_unit, "part_temperature": part_temperature}
     if elsewhere is not None:

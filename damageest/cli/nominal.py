@@ -27,7 +27,7 @@ def command(
     ],
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Average the forms of parts of one type, and write the mean part: a measured nominal."""
+    """Write the mean of parts of one type: a measured nominal."""
     end_with(lambda: _average(folders, output))
 
 

@@ -23,7 +23,7 @@ def command(
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """List a part's datums, datum systems and tolerances, with the CAD faces that they refer to."""
+    """List datums, datum systems and tolerances of a part. With the CAD faces that they refer to."""
     end_with(lambda: _list_pmi(part, units, as_json), as_json)
 
 

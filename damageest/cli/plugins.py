@@ -12,7 +12,7 @@ MOST_SHOWN = 6
 
 
 def command(as_json: AsJson = False) -> None:
-    """List installed plugins with licence, stages, export formats and commands, and broken plugins with the reason."""
+    """List installed plugins, and why broken ones fail. With licence, stages, export formats and commands."""
     with keep_for_results(as_json):
         plugins, conflicts = _collect()
     if as_json:

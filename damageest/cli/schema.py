@@ -27,8 +27,8 @@ def command(
         ),
     ] = SchemaName.job,
 ) -> None:
-    """Print the JSON Schema of job files, with the options of all installed plugins, or of result.json; or the tables
-    of reasons or errors."""
+    """Print JSON Schemas, or tables of reasons and errors. The schema of job files has the options of all installed
+    plugins."""
     from damageest.error_codes import format_errors
     from damageest.job.schema import job_schema
     from damageest.output.result_json import result_schema

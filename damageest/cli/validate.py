@@ -23,8 +23,8 @@ def command(
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Check jobs without computing a result, and list all errors with line and column. Where a job selects faces or
-    skin of the part, the part is read."""
+    """Check jobs and list all errors with line and column. It computes no result, and reads the part only where a job
+    selects faces or skin."""
     end_with(lambda: _check(jobs, settings or [], as_json), as_json)
 
 

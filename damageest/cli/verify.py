@@ -18,7 +18,7 @@ def command(
     as_json: AsJson = False,
     debug: Annotated[bool, typer.Option("--debug", help="Show a traceback on errors.")] = False,
 ) -> None:
-    """Check files and inputs of an output folder against the hashes in its result.json."""
+    """Check an output folder by the hashes in its result.json. Covers files and inputs."""
     end_with(lambda: _check(folder, rerun, as_json), as_json)
 
 

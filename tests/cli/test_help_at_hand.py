@@ -66,6 +66,18 @@ def test_every_page_that_the_code_names_is_there_with_its_section() -> None:
         assert not anchor or anchor in list_anchors(ROOT / name), link
 
 
+@pytest.mark.parametrize("group", [(), ("evaluate",), ("machine",)])
+def test_the_lists_of_commands_show_whole_sentences(group: tuple[str, ...]) -> None:
+    """In 80 columns: the first sentence of each command is short enough."""
+    done = CliRunner().invoke(app, [*group, "--help"], terminal_width=80, env={"COLUMNS": "80"})
+    if "No such command" in done.output or "needs the plugin" in done.output:
+        pytest.skip("the plugin is not installed")
+    listed = done.output.partition("Commands")[2]
+    assert len(listed.splitlines()) >= 4
+    assert "..." not in listed
+    assert "…" not in listed
+
+
 def fail_in(stage: str) -> StageError:
     error = StageError("no", "yes")
     error.stage = stage

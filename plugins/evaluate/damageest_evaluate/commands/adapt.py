@@ -23,7 +23,8 @@ def command(
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for adapt.jsonl, to resume from.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure the stage adapt on deformed parts with known loss, against rigid and plain fits and parts as designed."""
+    """Measure the stage adapt on deformed parts. Their loss is known; compared with rigid and plain fits and parts as
+    designed."""
     from damageest.errors import InputError
     from damageest.registry import Registry
     from damageest_evaluate.adapting.report import format_adapting_row, make_adapting_table

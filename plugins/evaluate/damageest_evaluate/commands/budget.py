@@ -22,7 +22,8 @@ def command(
     write: Annotated[Path | None, typer.Option(help="File whose table between the marks `budget` is replaced.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Draw scans with the errors that a certificate allows, and count how often the truth lies in the intervals.
+    """Count intervals that hold the truth for certified scans. Scans are drawn with the errors that a certificate
+    allows.
 
     Each draw goes through the whole route, the fit of the pose included.
     """

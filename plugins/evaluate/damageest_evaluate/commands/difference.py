@@ -23,7 +23,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Draw pairs of scans with a known loss between them, and compare what is found with the truth.
+    """Compare pairs of scans with a known loss between them.
 
     Poses are unknown, and most pairs overlap in part only.
     """

@@ -113,7 +113,7 @@ def job_command(
     plots: Plots = True,
     as_json: AsJson = False,
 ) -> None:
-    """Measure which depth of damage is found on your part with your scanner, and how accurately.
+    """Measure which damage your scanner shows on your part. By depth, with its accuracy.
 
     Random damages are removed from the job's part. The part is then scanned virtually, with the noise and the density
     of the job's scan. Damage that the job itself simulates is not used. Default sizes: no damage, and depths of 2, 4, 8
@@ -181,7 +181,7 @@ def suite_command(
         str, typer.Option(help="Name in the marks <!-- NAME: begin --> and <!-- NAME: end --> of --write.")
     ] = "suite",
 ) -> None:
-    """Measure accuracy on random damages of thirteen built-in parts, from scan to damage volume."""
+    """Measure accuracy on random damages of built-in parts. Thirteen parts, from scan to damage volume."""
     from damageest.errors import InputError
     from damageest.registry import Registry
     from damageest_evaluate import suite
@@ -263,7 +263,7 @@ def matrix_command(
     marks: Annotated[str, typer.Option(help="Name in the marks of --write.")] = "matrix",
     as_json: AsJson = False,
 ) -> None:
-    """Measure IoU, time and memory of every implementation of every stage, with the other stages at default."""
+    """Measure IoU, time and memory of every implementation. The other stages are at default."""
     from damageest.registry import Registry
     from damageest_evaluate.matrix import run_matrix
     from damageest_evaluate.readme import make_matrix_table, replace_between_marks

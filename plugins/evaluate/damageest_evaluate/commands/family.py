@@ -22,7 +22,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count right results on random draws of families: walls (300), hands (60), turned (60), datums (40).
+    """Count right results on random draws of families. Families: walls (300), hands (60), turned (60), datums (40).
 
     walls: a pit in a wall of 0.6 to 8 mm, scanned from outside, inside or both. hands: the part or its mirror image.
     turned: round parts whose angle one small feature fixes. datums: parts held by sound or worn datums.

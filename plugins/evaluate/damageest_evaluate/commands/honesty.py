@@ -32,7 +32,7 @@ def command(
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Count right, said and silent results on scans with known trouble.
+    """Count right, said and silent results on bad scans.
 
     The troubles are those of real scans: lost walls, skin that was not scanned, a wrong part, frame or unit, fixtures,
     misplaced views, and others. A result is silent where it is wrong, the truth is outside the

@@ -22,7 +22,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count right verdicts on repaired parts, and faulty parts signed as met.
+    """Count right verdicts on repaired parts. Faulty parts signed as met are listed.
 
     Brackets, blocks and shafts with three repaired sites: perfect ones, and ones with a known fault.
     """

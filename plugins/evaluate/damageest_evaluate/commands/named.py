@@ -22,7 +22,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count how often each named background gives the default's damage, on random damages with known truth.
+    """Compare each named background with the default. On random damages with known truth.
 
     right: an IoU of at least 0.97 of the default's. refused: with a remedy whose run finds the damage.
     """

@@ -32,7 +32,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Plan deposition paths for deposits of known shape, and check fill and collisions of the nozzle.
+    """Plan and check paths for deposits of known shape. Checks fill and collisions of the nozzle.
 
     Each deposit is planned with 3 and with 5 axes, and both paths are checked. Bead and nozzle fit the deposit; on the
     files of --part the bead is 1.2 mm wide, or less on a small part. The checks share no code with the planner.

@@ -21,7 +21,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Open ragged damages before deposition, and compare the volume that a 3-axis path reaches."""
+    """Measure what opening a damage adds to a 3-axis path."""
     from damageest.registry import Registry
     from damageest_evaluate.paths.prepare import make_prepare_table, run_prepare
 

@@ -21,7 +21,7 @@ def command(
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for real.jsonl, to resume from.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run real parts with their CAD and compare the largest site with a crude difference.
+    """Run real parts and compare them with a crude difference.
 
     The difference shares no code with the program. In the found pose it sums the loss deeper than the tolerance, and
     the same with its shallow rim; both sums must lie in the site's interval.

@@ -29,7 +29,7 @@ def command(
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
     as_json: AsJson = False,
 ) -> None:
-    """Measure pose, damage, doubt, notes and time on scans as six real sensors make them.
+    """Measure results on scans as six real sensors make them.
 
     Structured light, laser line, time of flight, stereo camera, photogrammetry and tomography scan ten parts from 1 to
     12 views. The job knows the part and the unit: the pose is unknown and the tolerance is auto.

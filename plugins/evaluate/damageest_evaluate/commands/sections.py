@@ -17,9 +17,9 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count how often the diameter of a shaft with form is within its uncertainty.
+    """Count shaft diameters within their uncertainty.
 
-    Lobes, wear on one side and grooves, seen all around or on an arc of 206 to 298 degrees.
+    The shafts have lobes, wear on one side and grooves, seen all around or on an arc of 206 to 298 degrees.
     """
     from damageest_evaluate.commands._counted import write_measured
     from damageest_evaluate.readme import format_markdown

@@ -27,7 +27,7 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Measure processor and wall time of runs of several kinds, one after the other.
+    """Measure processor and wall time of several kinds of runs.
 
     Each runs in a process of its own, and is compared with one exact distance pass of libigl over the same points in
     the same process.

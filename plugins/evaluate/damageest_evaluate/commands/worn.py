@@ -17,7 +17,7 @@ def command(
     out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for worn.jsonl, to resume from.")] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count which of 60 worn bushes, dies, rails, cams, seats and punches come out.
+    """Count right results on 60 worn parts. Bushes, dies, rails, cams, seats and punches.
 
     Wear of 0.3 to 0.6 mm fades out over a bore, a face or a flank; all skin is off by a slow 0.04 to 0.07 mm; the
     points lie on the triangles of a scanner's mesh.

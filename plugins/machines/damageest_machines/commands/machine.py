@@ -8,7 +8,7 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(no_args_is_help=True, help="List, show and check machine files, for programs from deposition paths.")
+app = typer.Typer(no_args_is_help=True, help="List, show and check machine files.")
 
 AsJson = Annotated[bool, typer.Option("--json", help="Print one line of JSON on standard output, for programs.")]
 
@@ -49,7 +49,7 @@ def print_schema() -> None:
 def check_machine(
     file: Annotated[str, typer.Argument(help="Machine file, or the name of one that the package brings.")],
 ) -> None:
-    """Check a machine file, and say what kind of machine it defines."""
+    """Check a machine file, and name its kind of machine."""
     from damageest_machines.files import find_file, read_machine
 
     machine = read_machine(find_file(_find(file)))
