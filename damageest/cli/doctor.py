@@ -13,7 +13,6 @@ import typer
 
 from damageest.cli._json import AsJson, say_json
 from damageest.cli._streams import keep_for_results, say
-from damageest.cli._trials import try_plugins
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -78,6 +77,7 @@ def examine(quick: bool) -> Findings:
     """Looks at the system and the packages; without ``quick``, runs a small job too."""
     from ctypes.util import find_library
 
+    from damageest.cli._trials import try_plugins  # it imports numpy, which --help does not need
     from damageest.errors import EXTRAS, describe_install
     from damageest.isolation.limits import measure_free_memory
     from damageest.registry import Registry

@@ -32,7 +32,7 @@ def test_a_sound_installation_gives_the_true_volume() -> None:
 def test_a_wrong_volume_and_a_missing_extra_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("damageest.api.run", lambda job: SimpleNamespace(damage_volume=261.8))
     monkeypatch.setattr(doctor, "_has", lambda extra: extra != "report")
-    monkeypatch.setattr(doctor, "try_plugins", lambda *given, **named: (0, []))  # of plugins other tests ask
+    monkeypatch.setattr("damageest.cli._trials.try_plugins", lambda *given, **named: (0, []))
     done = CliRunner().invoke(app, ["doctor"])
     assert done.exit_code == 1
     assert "fault: the self-test gave a wrong volume" in done.output
