@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
 import threading
@@ -297,3 +298,24 @@ def test_hints_are_complete_for_a_caller_who_is_strict(tmp_path: Path) -> None:
     errors = [line for line in done.stdout.splitlines() if ": error:" in line]
     assert len(errors) == 1, done.stdout
     assert "caller.py:14" in errors[0]
+
+
+PAGE = Path(__file__).parents[1] / "docs/python.md"
+
+
+@pytest.mark.slow
+def test_the_code_of_the_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In its order, as one program, with a small job in place of the repository's."""
+    text = PAGE.read_text()
+    assert len(text.splitlines()) <= 80
+    damaged_box.write_small(tmp_path / "jobs").rename(tmp_path / "jobs/block_wedge.yaml")
+    monkeypatch.chdir(tmp_path)
+    names: dict[str, Any] = {"mesh": trimesh.creation.box(damaged_box.SIZE), "points": damaged_box.scan(6000)}
+    blocks = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert len(blocks) >= 5
+    for block in blocks:
+        exec(compile(block, str(PAGE), "exec"), names)
+    assert names["bore"].is_watertight
+    assert names["result"].tolerance == 0.2
+    assert (tmp_path / "out/block/result.json").is_file()
+    assert (tmp_path / "out/kept/result.json").is_file()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import json
 import re
 import sys
@@ -9,15 +10,19 @@ import tomllib
 import xml.etree.ElementTree as ElementTree
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from typer.testing import CliRunner
 
 import damageest
+from damageest.cli import app
 from damageest.errors import StageError
 from damageest.job import load
 from damageest.registry import Registry
 from damageest.result import Result
 from tests import damaged_box
+from tests.needs import import_or_skip
 from tests.stages.export import results
 
 ROOT = Path(__file__).parents[1]
@@ -158,3 +163,28 @@ def test_the_recording_shows_the_volume_of_the_readme_and_loads_nothing() -> Non
     assert shown in drawn
     assert "/work/" not in drawn
     assert "/home/" not in drawn
+
+
+@pytest.mark.slow
+def test_lost_metal_cut_back_and_stock_stand_wherever_a_result_is_shown(small_done: Path) -> None:
+    """In the terminal, the report, the PDF, the notebook and the app: the same three numbers."""
+    pdf = import_or_skip("pypdfium2")
+    app_results = import_or_skip("damageest_app.results")
+    text = small_done.read_text().replace("report: none", "report: {use: html, pdf: true}")
+    small_done.write_text(text + "allowance: {use: milling, outer: 0.5, inner: 0.4}\n")
+    done = CliRunner().invoke(app, ["run", str(small_done)])
+    assert done.exit_code == 0, done.output
+    result = damageest.run(small_done, output=True)
+    told = result.describe_volumes()
+    assert re.fullmatch(r"lost metal [0-9.]+ mm³, cut-back [0-9.]+ mm³, stock [0-9.]+ mm³", told)
+    assert result.lost_volume == pytest.approx(damaged_box.TRUE_VOLUME, rel=0.03)
+    assert told in " ".join(done.output.split())
+    folder = small_done.parent / "out/job"
+    for page in ((folder / "report.html").read_text(), result._repr_html_()):
+        assert told in " ".join(html.unescape(re.sub("<[^>]+>", " ", page)).split())
+    book = pdf.PdfDocument(folder / "report.pdf")
+    printed = " ".join(book[0].get_textpage().get_text_range().split())
+    book.close()
+    assert all(part in printed for part in told.split(", "))
+    content = json.loads((folder / "result.json").read_text())
+    assert app_results.Results._describe_volumes(SimpleNamespace(content=content, unit="mm")) == told
