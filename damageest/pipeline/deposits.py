@@ -15,6 +15,7 @@ from damageest.geometry.solids import concatenate_meshes, subtract_lost, to_mani
 from damageest.geometry.touching import separate_sheets
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.pores import PORE
+from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Failures, FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.stages.allowance import Allowance
@@ -42,6 +43,8 @@ def make_deposits(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...
             refuse_bubbles(made.deposit, made.damage, state.part)
             done.append(made)
         except StageError as error:
+            if not error.stage:  # the check's own
+                locate_error(error, engine.job.implementations[Allowance], site)
             failures.append(error)
             done.append(replace(site.with_value(FoundSite.deposit, None), refused=True))
     return tuple(done), failures
@@ -59,7 +62,7 @@ def refuse_bubbles(deposit: Solid | None, damage: Solid, part: Solid) -> None:
         box = np.reshape(largest.bounding_box(), (2, 3)).mean(axis=0) + origin
         place = ", ".join(f"{value:.4g}" for value in box)
         raise StageError(
-            f"allowance: the deposit encloses an empty space of {largest.volume():.3g} in volume, near ({place})",
+            f"the deposit encloses an empty space of {largest.volume():.3g} in volume, near ({place})",
             "take another outer or overlap, or a keep_out that reaches out of the deposit",
         )
 
