@@ -48,16 +48,15 @@ def run(
     ``job``: a path, a mapping of the same shape, or a checked Job. ``part`` (`damageest.io.given.PARTS`: of numpy,
     trimesh, PyVista, Open3D) and ``scan`` (`damageest.io.given.SCANS`) replace the job's files; both may also be in the
     mapping. ``settings`` are overrides: ``["cluster.eps=0.4"]``, or ``{"cluster.eps": 0.4}``. Lengths are in the job's
-    unit. ``cache``: False computes all anew; a `MemoryCache` keeps what stages give from run to run, also without
+    unit. ``cache``: False computes all anew; a `MemoryCache` keeps outputs of stages from run to run, also without
     files. ``progress`` is called in this thread when a stage or step begins (where it fails, a warning says so, and it
-    is not called again); ``cancel``, as a `threading.Event`, ends
-    the run from another thread. In a notebook a run without ``progress`` shows it by itself.
-    ``limits`` of memory and time hold for stages that run in a process of their own, those that call a native library.
-    As long as it runs, the linear algebra of numpy and scipy uses one thread in this process, so that the same job
-    gives the same bytes on any number of cores.
+    is not called again); ``cancel``, for example a `threading.Event`, ends the run from another thread. In a notebook a
+    run without ``progress`` shows it by itself. ``limits`` of memory and time hold for stages that run in a process of
+    their own, those that call a native library. As long as it runs, the linear algebra of numpy and scipy uses one
+    thread in this process, so that the same job gives the same bytes on any number of cores.
 
     Raises JobError or InputError (job or input at fault), StageError (a stage failed or refused) and CancelledError.
-    ``so_far`` of the error has what was computed before it.
+    ``so_far`` of the error has the results before it.
     """
     _check_types(cache, progress, cancel)
     registry, limits = registry or Registry.discover(), limits or Limits()

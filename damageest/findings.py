@@ -69,11 +69,11 @@ class Surplus:
     """Metal or other matter outside the nominal surface.
 
     ``points`` (M,) indices into the scan, ``share`` of it; ``solid``: its volume as a closed mesh, None where it cannot
-    be closed; ``height``: its largest distance from the skin; ``area``: skin that it covers. ``kind``: `surplus`, as a
-    weld bead or dirt; `displaced piece`, with losses of like size beside it; `surroundings`, as a fixture, a table or a
-    second specimen. ``clusters``: the point clusters of the losses beside it. ``notes`` say what was recognised.
-    ``estimate``: of its volume, the skin that it covers times its mean height; no more than that is known of one that
-    is not closed. 0 for surroundings.
+    be closed; ``height``: its largest distance from the skin; ``area``: skin that it covers. ``kind``: `surplus`, for
+    example a weld bead or dirt; `displaced piece`, with losses of like size beside it; `surroundings`, for example a
+    fixture, a table or a second specimen. ``clusters``: the point clusters of the losses beside it. ``notes`` say what
+    was recognised. ``estimate``: estimated volume, the covered skin times its mean height, the only one for a surplus
+    that is not closed; 0 for surroundings.
     """
 
     id: int
@@ -94,8 +94,8 @@ class Surplus:
 
 @dataclass(frozen=True)
 class PatchDeviation:
-    """Mean deviations of patches of skin of width ``size``: their standard deviation ``deviation``, what the noise of
-    their points explains (``noise``), and what is left after the form that the fit names (``left``)."""
+    """Mean deviations of patches of skin of width ``size``: their standard deviation ``deviation``, the share that the
+    noise of their points explains (``noise``), and the residual after removing the form of the fit (``left``)."""
 
     size: float
     deviation: float
@@ -132,14 +132,14 @@ DONE: dict[Deformed, str] = {
 class ModelFit:
     """How well the part as designed, in one rigid pose, explains the intact skin.
 
-    ``scale``: length in the scan over length in the CAD, with its standard error; ``scale_by_axis`` (3,) along
-    ``axes`` (3,3, as rows); those of a model that is `ok` are within their errors and the scanner's. ``deformation``:
-    kinds and amounts: the largest displacement of the seen skin beyond the rigid motion nearest to it, with
-    ``amount`` for all together and ``amount_error``. ``waviness``: standard deviation of what no form explains.
-    ``corrected_scale``: the scale that was taken out of the scan, 1 where none was. ``words`` say it all. `open`: no
-    form was found, and something else speaks against the part as designed in this pose. ``views_from``: whether the
-    scan says which points are a view, or their order or two surfaces over the same skin do; ``views_hidden``: volume
-    that may be worn off where only the part shows how views were misplaced that were moved.
+    ``scale``: length in the scan over length in the CAD, with its standard error; ``scale_by_axis`` (3,) along ``axes``
+    (3,3, as rows); those of a model that is `ok` are within their errors and the scanner's. ``deformation``: kinds and
+    amounts: the largest displacement of the seen skin beyond the rigid motion nearest to it, with ``amount`` for all
+    together and ``amount_error``. ``waviness``: standard deviation that no form explains. ``corrected_scale``: the
+    corrected scale of the scan, 1 for none. ``words``: all of it as text. `open`: no form was found, but there are
+    other reasons against the part as designed in this pose. ``views_from``: whether the scan, the order of its points
+    or two surfaces over the same skin define the views; ``views_hidden``: volume that may be worn off where only the
+    part shows how views were misplaced that were moved.
     """
 
     model: Literal["ok", "scaled", "deformed", "views disagree", "wavy", "open"]

@@ -152,12 +152,11 @@ class Result:
     accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
-    high end. ``budget``: the uncertainty of that volume, source by source; ``not_in_budget``: sources that the job does
-    not tell, in words; ``certificate``: scanner and standard, as the job has them. ``adapted``: how ``part`` was
-    deformed to follow the scan; None: it is the part as designed. ``sections``: those that the job asks
-    for, of the part as designed, in the pose of the run. ``conversions``: what plugins can convert it to, see
-    `convert`. ``scan_factor``: what the lengths of ``scan`` were divided by, for temperature and scale, about
-    ``scan_centre`` (3,); see `transform_to_scan` and `raw_points`.
+    high end. ``budget``: the uncertainty of that volume, source by source; ``not_in_budget``: names of sources that the
+    job does not give; ``certificate``: scanner and standard, as the job has them. ``adapted``: deformation of ``part``
+    to follow the scan; None: it is the part as designed. ``sections``: the job's sections, of the part as designed, in
+    the pose of the run. ``conversions``: conversions by plugins, see `convert`. ``scan_factor``: divisor of the lengths
+    of ``scan``, for temperature and scale, about ``scan_centre`` (3,); see `transform_to_scan` and `raw_points`.
     """
 
     name: str

@@ -33,21 +33,19 @@ class AdaptedPart(Checked):
 
     ``part``: the deformed part, of V vertices. ``displacement`` (V,3): that of each vertex from the part as designed;
     over intact skin it has no rigid part. ``motion`` (4,4): rigid; takes the aligned scan onto the deformed part.
-    ``modes`` (K,V,3): how exactly the displacement is known where no intact skin shows it: independent errors, each as
-    one standard deviation; ``unfollowed``: the same beside intact skin, by what the field leaves of the worst of it.
-    ``lowered`` (V,): by how much the skin is deeper in the part than a field that hardly strains the metal has it,
-    where that is told: form or wear.
-    ``other`` (V,3): what else explains the scan as well, as a change of the displacement; None where nothing does.
-    ``amount``, ``rms``: largest and root of the mean square of the displacement over the seen skin. ``growth``: the
-    uniform scale in it, less 1; ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells
-    along the axes, (0, 0, 0) for a polynomial; ``functions``: how many functions each coordinate is a sum of.
-    ``gain``: share by which it explains held-out patches of the scan better than a rigid part; ``held_out``: what the
-    rigid part and the field leave there, root mean square, deviations limited; ``patches``: their number. ``field``:
-    the same displacement at any place, for CAD faces and for other parts of the type; None where there is none.
-    ``seen`` (S,3): places on the skin as designed where intact skin was scanned; skin within ``reach`` of one was seen;
-    ``left`` (S,): how far the scan lies outside the adapted skin there, noise averaged out. ``prior``: what other parts
-    of the type said; None where none were given. ``designed``: hashes that name the part as designed, for jobs on other
-    parts of its type. ``notes`` are warnings.
+    ``modes`` (K,V,3): independent errors of the displacement where no intact skin shows it, each as one standard
+    deviation; ``unfollowed``: the same beside intact skin, from the worst residuals of the field. ``lowered`` (V,):
+    depth of the skin below that of a field that hardly strains the metal, where noted: form or wear. ``other`` (V,3):
+    change of the displacement that explains the scan as well; None where there is none. ``amount``, ``rms``: largest
+    and root of the mean square of the displacement over the seen skin. ``growth``: the uniform scale in it, less 1;
+    ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells along the axes, (0, 0, 0) for a
+    polynomial; ``functions``: number of functions for each coordinate. ``gain``: relative gain on held-out patches of
+    the scan against a rigid part; ``held_out``: root mean square residuals of rigid part and field there, deviations
+    limited; ``patches``: their number. ``field``: the same displacement at any place, for CAD faces and for other parts
+    of the type; None where there is none. ``seen`` (S,3): places on the skin as designed where intact skin was scanned;
+    skin within ``reach`` of one was seen; ``left`` (S,): distance of the scan outside the adapted skin there, noise
+    averaged out. ``prior``: prediction by other parts of the type; None without any. ``designed``: hashes that name the
+    part as designed, for jobs on other parts of its type. ``notes`` are warnings.
     """
 
     part: Part

@@ -135,13 +135,13 @@ class Deposit(Solid):
     ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
     ``cut_back_volume`` the volume that this removes in addition. ``milled``: where the cavity was opened (`prepare`),
     the intact metal to be milled off before deposition, cut-back included: the DV then stays as it is.
-    ``stock_volume``: what is above the nominal surface; ``thickness``: its least, mean and largest height over the skin
-    where stock was asked for, None where none was; ``touched``: the numbers of the CAD faces that stock stands on, as
-    in `Part.faces_brep`, empty where the part has none. ``heights``: of the damage's CAD faces by number, how high the
-    job wants the stock on it, -1 where that is not the same all over it; ``overlap``: how far the stock covers the
-    intact skin. ``notes`` are warnings. ``opening``: a solid that takes the cavity out of the part and stands out of
-    it, None where the cavity is the damage volume or that is not known. Where the cavity was opened, no face of it lies
-    on the skin, so that a difference leaves nothing over the opening.
+    ``stock_volume``: volume above the nominal surface; ``thickness``: its least, mean and largest height over skin with
+    stock, None without stock; ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`,
+    empty where the part has none. ``heights``: wanted height of the stock by number of the damage's CAD faces, -1 where
+    it varies on the face; ``overlap``: width of the intact skin under stock. ``notes`` are warnings. ``opening``: a
+    solid that takes the cavity out of the part and stands out of it, None where the cavity is the damage volume or that
+    is not known. Where the cavity was opened, no face of it lies on the skin, so that a difference leaves nothing over
+    the opening.
     """
 
     cavity: Solid | None = None
@@ -174,14 +174,14 @@ class Surface(Mesh):
 class Part(Solid):
     """The part as designed.
 
-    ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and
-    ``face_kinds`` what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds
-    the distance between the CAD surface and the triangles. ``cad_scale``: one length of the CAD file, as its reader
-    takes it, in ``unit``; 0 where the file was a mesh. ``notes`` say what was repaired or converted.
+    ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and ``face_kinds``
+    what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds the distance
+    between the CAD surface and the triangles. ``cad_scale``: one length of the CAD file, as its reader takes it, in
+    ``unit``; 0 where the file was a mesh. ``notes``: repairs and conversions.
 
     Where an earlier scan stands in place of the design: ``unseen`` (F,) has the triangles that only close the surface,
-    since that scan has no points there, ``scan_noise`` the standard deviation of its points, and ``scan_spacing`` how
-    far they lie apart. None and 0 for a part as designed.
+    since that scan has no points there, ``scan_noise`` the standard deviation of its points, and ``scan_spacing`` their
+    spacing. None and 0 for a part as designed.
     """
 
     unit: str = "mm"

@@ -66,7 +66,7 @@ class Row:
 
     @property
     def verdict(self) -> str:
-        """The verdicts in words."""
+        """The verdicts as text."""
         if not self.has_result:
             return ""
         counts = [f"{self.verdicts[level]} {level}" for level in LEVELS if self.verdicts.get(level)]
@@ -113,7 +113,7 @@ def _close_interval(interval: Interval | None) -> tuple[float, float | None] | N
 
 
 def show_interval(interval: tuple[float, float | None]) -> str:
-    """The interval of a row in words."""
+    """The interval of a row as text."""
     low, high = interval
     return describe_interval((low, math.inf if high is None else high))
 

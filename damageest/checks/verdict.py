@@ -69,7 +69,7 @@ def open_end(interval: Interval | None, reasons: Sequence[Reason]) -> Interval |
 def decide(volume: float, interval: Interval | None, reasons: tuple[Reason, ...], certain: float = 0.0) -> Verdict:
     """The verdict on a damage volume, of which a piece of ``certain`` volume is lost in any case.
 
-    A cause that has a size is a term of the ``interval`` and condemns nothing by itself; a contradiction does.
+    Quantifiable errors are terms of the ``interval``; the verdict follows from its width and from contradictions.
     """
     return Verdict(_choose_level(volume, interval, {reason.effect for reason in reasons}, certain), reasons)
 

@@ -170,7 +170,7 @@ def _note_turned(shells: Shells, notes: list[str]) -> None:
     if not wrong.all() and (turned := int((wrong & ~top).sum())):
         notes.append(
             f"reversed the triangles of {turned} shell{'s' * (turned > 1)} inside a body, which faced outward as a "
-            f"body does: taken for {'cavities' if turned > 1 else 'a cavity'}"
+            f"body does: {'they count as cavities' if turned > 1 else 'it counts as a cavity'}"
         )
 
 

@@ -127,7 +127,7 @@ class SurfaceTree:
 def _require_some(rows: Ints, what: str) -> None:
     """Raises ValueError where there are no rows. libigl ends the process by a segmentation fault there."""
     if not len(rows):
-        raise ValueError(f"no distance: what it is measured to has no {what}; ask only where there is one")
+        raise ValueError(f"no distance: the target has no {what}; ask only where there is one")
 
 
 def _find_none() -> Closest:

@@ -97,7 +97,7 @@ class SignedMesh:
         if not len(points):
             return np.empty(0), np.empty(0, np.int64), np.empty((0, 3)), np.empty((0, 3))
         if not len(self.faces):  # libigl ends the process by a segmentation fault there
-            raise ValueError("no distance: what it is measured to has no triangle; ask only where there is one")
+            raise ValueError("no distance: the target has no triangle; ask only where there is one")
         tree, vertices, faces, origin = self.tree
         squared, found, place = tree.squared_distance(vertices, faces, points)
         face, place = origin[np.ravel(found)], np.reshape(place, (-1, 3))

@@ -20,10 +20,9 @@ Step = Literal["deposited", "milled"]
 
 @dataclass(frozen=True, eq=False)
 class Aim:
-    """``folder``: what the run before the repair wrote. ``target``: the part as it is to be after the step;
-    ``nominal``: as designed, or adapted to the scan before. ``deposits``: what was to be deposited, by number of site;
-    ``stock``: how high it stands above the skin, least, by site. ``refused``: sites that the result did not accept, or
-    without a deposit."""
+    """``folder``: output of the run before the repair. ``target``: the part after a perfect step; ``nominal``: as
+    designed, or adapted to the scan before. ``deposits``: planned deposits, by number of site; ``stock``: their least
+    height above the skin, by site. ``refused``: sites that the result did not accept, or without a deposit."""
 
     folder: OutputFolder
     step: Step

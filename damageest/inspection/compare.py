@@ -68,7 +68,7 @@ class Inspection:
 
 
 def ask(aim: Aim, asked: Mapping[str, Any]) -> Question:
-    """What is asked: by the job of the run before, and before that by ``asked``, without what is None."""
+    """The settings: ``asked`` first, then those of the job of the earlier run."""
     of_job = aim.folder.content["provenance"]["job"].get("inspect") or {}
     told: dict[str, Any] = {**of_job, **_leave_out_none(asked)}
     known = {field.name for field in fields(Question)}

@@ -28,9 +28,9 @@ Kind = Literal["missing", "stock short", "over"]
 @dataclass(frozen=True)
 class Finding:
     """``kind``: "missing": metal as designed that is not there; "stock short": stock that is not there; "over": metal
-    beyond what was to be. ``sites``: all that it lies on, 0 for elsewhere; ``site``: the one with most of it.
-    ``volume`` with its 95 % interval, None where there is none. ``depth``: largest distance from where the surface was
-    to be. ``level``: what the volume is worth."""
+    beyond the target. ``sites``: all that it lies on, 0 for elsewhere; ``site``: the one with most of it. ``volume``
+    with its 95 % interval, None where there is none. ``depth``: largest distance from the target surface. ``level``:
+    confidence in the volume."""
 
     kind: Kind
     site: int
@@ -53,7 +53,7 @@ def list_findings(aim: Aim, result: Result, landed: Mapping[int, Landed], fixed:
 
 
 def name_places(sites: Sequence[int]) -> str:
-    """Where a finding lies, in words."""
+    """The place of a finding as text."""
     numbers = sorted(number for number in sites if number)
     named = [f"site{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"] if numbers else []
     return " and ".join([*named, *(["elsewhere"] if ELSEWHERE in sites else [])])

@@ -201,7 +201,7 @@ class _Check:
         return DEFAULTS[contracts[0] if by_site else contracts[-1]]
 
     def find_reader(self, key: str, paths: Any) -> str | None:
-        """The implementation that reads such a file; None leaves it to `file`, which says what it can read."""
+        """The implementation that reads such a file; None leaves it to `file`, which lists its formats."""
         if paths == []:
             self.add_fault("the list of files is empty", key, "path")
             return None

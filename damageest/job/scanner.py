@@ -21,8 +21,7 @@ Formula = Annotated[
 
 
 class Certificate(Options):
-    """Figures of a certificate of acceptance or calibration, or of a data sheet. A figure that is left out is not
-    known, and the budget names it."""
+    """Figures of a certificate of acceptance or calibration, or of a data sheet. The budget names missing figures."""
 
     probing_form: float | None = Field(
         None, ge=0, description="probing form error, the range of distances to a fitted sphere, in the job's unit"

@@ -25,7 +25,7 @@ GRAPHICS_LIBRARY = re.compile(r"lib(GL|EGL|GLX|OpenGL|OSMesa|GLdispatch)\b")
 
 
 def describe_failure(error: Exception, what: str = "the picture could not be drawn") -> Exception:
-    """The error to tell; that OpenGL is missing is said only where that is so, or likely."""
+    """The error for the user; it names OpenGL only where that is missing, or likely to be."""
     if GRAPHICS_LIBRARY.match(find_missing_library(error)):
         return StageError(f"{what}: this machine has no OpenGL ({error})", INSTALL_GRAPHICS, code="missing")
     if isinstance(error, ProcessError) and error.why == "crash" and "SIGKILL" not in error.message:

@@ -101,7 +101,7 @@ class ExactReport(JsonModel):
 
 
 class ThicknessReport(JsonModel):
-    """Height of the stock over the nominal surface, where stock was asked for."""
+    """Height of the stock over the nominal surface, on skin with stock."""
 
     min: float
     mean: float
@@ -152,8 +152,8 @@ class SiteReport(JsonModel):
     )
     path: PathReport | None = Field(description="null where the job asks for none, or none could be planned")
     files: FilesReport
-    spline: SplineReport | None = Field(description="null where the job asks for none")
-    exact: ExactReport | None = Field(description="null where no STEP is asked for, or the part has no CAD faces")
+    spline: SplineReport | None = Field(description="null: no spline in the job")
+    exact: ExactReport | None = Field(description="null: no STEP in the job, or no CAD faces")
     warnings: list[ReasonReport] = Field(description="notes of stages on the site; they change no verdict")
 
 

@@ -45,7 +45,7 @@ def _compare(path: Path, sha256: str) -> str:
 
 
 def find_other_versions(content: Mapping[str, Any]) -> list[str]:
-    """Packages and system that are others here than where the result was made; in words."""
+    """Packages and system that differ from those of the result, as text."""
     provenance = content["provenance"]
     here = list_packages(provenance["sources"])
     other = [
@@ -59,8 +59,8 @@ def find_other_versions(content: Mapping[str, Any]) -> list[str]:
 
 
 def find_differences(first: Mapping[str, Any], second: Mapping[str, Any]) -> list[str]:
-    """What two results do not have in common, in words: values of their content, and files. Their times, their paths
-    and what was taken from earlier runs are not compared."""
+    """Differences of two results as text: values of their content, and files. Times, paths and reuse of earlier runs
+    are not compared."""
     found = _differ(_strip(first), _strip(second), "")
     before, after = ({item["path"]: item["sha256"] for item in one["provenance"]["outputs"]} for one in (first, second))
     for name in sorted({*before, *after} - set(DATED)):

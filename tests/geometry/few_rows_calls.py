@@ -404,7 +404,7 @@ WITHOUT_ROWS: dict[str, str] = {
 }  # fmt: skip
 """Why a public name takes no number of rows."""
 
-NO_TRIANGLE = r"no distance: what it is measured to has no (triangle|edge)"
+NO_TRIANGLE = r"no distance: the target has no (triangle|edge)"
 FEW_POINTS = r"no inner damage surface could be reconstructed from \d points"
 NO_VOLUME = r"holds no triangles|encloses no volume"
 REFUSALS: dict[str, str] = {

@@ -19,7 +19,7 @@ BODIES = {
     "one of them inside out": (join(box(), invert(box(at=(30, 0, 0)))), 2000, "reversed the triangles of 1 of 2"),
     "overlapping": (join(box(), box(at=(5, 1, 1))), 2000 - 5 * 9 * 9, "united 2 bodies"),
     "face to face": (join(box(), box(at=(10, 0, 0))), 2000, "united 2 bodies"),
-    "one in the other": (join(box(), box(4)), 1000 - 64, "taken for a cavity"),
+    "one in the other": (join(box(), box(4)), 1000 - 64, "it counts as a cavity"),
     "overlapping, one of them inside out": (join(box(), invert(box(at=(5, 1, 1)))), 2000 - 5 * 9 * 9, "of 1 of 2"),
     "face to face, one of them inside out": (join(invert(box()), box(at=(10, 0, 0))), 2000, "of 1 of 2"),
     "the same twice, once inside out": (join(box(), invert(box())), 1000, "of 1 of 2"),

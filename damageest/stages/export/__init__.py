@@ -18,12 +18,12 @@ from damageest.stages import Stage, asked_by_name
 
 @dataclass(frozen=True)
 class ExportedFiles(Checked):
-    """What an export wrote.
+    """The files of an export.
 
-    ``files``: paths relative to the output folder. ``notes``: what differs from what the job asks for.
-    ``splines``: for each site, by its number, how well a spline fits its inner damage surface; empty where the job asks
-    for none. ``exact``: for each site, by its number, whether its solid has the CAD's own faces; empty where none was
-    asked for. ``warnings``: those of the notes that the user is told at the end of the run.
+    ``files``: paths relative to the output folder. ``notes``: differences from the job. ``splines``: for each site, by
+    its number, the fit of a spline to its inner damage surface; empty without splines in the job. ``exact``: for each
+    site, by its number, whether its solid has the CAD's own faces; empty without exact solids in the job. ``warnings``:
+    the notes that the run prints at its end.
     """
 
     files: tuple[str, ...] = ()
@@ -56,9 +56,9 @@ class ExactForm:
     ``inner_faces``: how many faces it has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of
     its inner surface are as near to the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is
     farther than a quarter of the tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of
-    the processor. ``tried``: what was refused before it, and why. ``deposit``: how the deposit was written; None where
-    there is none beside the damage volume. ``milled``: how the metal that is milled off before deposition was written;
-    None where the cavity was not opened.
+    the processor. ``tried``: forms refused before it, with reasons. ``deposit``: how the deposit was written; None
+    where there is none beside the damage volume. ``milled``: how the metal that is milled off before deposition was
+    written; None where the cavity was not opened.
     """
 
     form: str
@@ -205,12 +205,12 @@ with these settings; ``channels``: the names of those that the paths will have. 
 
 @dataclass(frozen=True)
 class PathWriter:
-    """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the
-    path in the frame asked for, or in its set-up frame where it has one (`DepositPath.setup` then takes points of the
-    frame asked for to it), and a `PathSettings`; the same path gives the same bytes. It gives notes, of which the user
-    is told at the end of the run, or None, and raises StageError for a path that the format cannot hold or the machine
-    cannot run: then there is no file. ``suffix``: of the file, without the dot. ``check``: called before anything is
-    computed; None for none."""
+    """How a deposition path is written. ``write``: a function of ``file, path, settings``, a file to create, the path
+    in the frame asked for, or in its set-up frame where it has one (`DepositPath.setup` then takes points of the frame
+    asked for to it), and a `PathSettings`; the same path gives the same bytes. It gives notes, which the run prints at
+    its end, or None, and raises StageError for a path that the format cannot hold or the machine cannot run: then there
+    is no file. ``suffix``: of the file, without the dot. ``check``: called before anything is computed; None for
+    none."""
 
     write: Callable[[Path, DepositPath, PathSettings], Sequence[str] | None]
     suffix: str
@@ -239,7 +239,7 @@ class Export(Stage, ABC):
 
     Returns:
         The paths of all files written, relative to ``folder`` and with forward slashes; the same result gives the same
-        bytes. ``notes`` say what was written otherwise than asked for, or left out.
+        bytes. ``notes`` list differences from the job, and omissions.
 
     Raises:
         OSError: where a file cannot be written.

@@ -23,7 +23,7 @@ class Reconstruct(Stage, ABC):
         An open mesh in the part's frame, with normals toward the lost metal. No more than two triangles share an edge.
 
     Raises:
-        StageError: where no surface follows from the points. Name the reason and, as ``remedy``, what to try.
+        StageError: where no surface follows from the points. Give the reason, and a ``remedy``.
 
     Example::
 
