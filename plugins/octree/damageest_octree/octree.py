@@ -78,9 +78,10 @@ class Octree(EncloseAll):
         cube, flags, more = self._classify(cube, part, aligned, deviation, sites)
         notes += more
         if flags.reach:
-            notes += (f"gaps between the scan points were closed up to {2 * flags.reach} cells of {cube.cell:.3g}",)
+            gap = f"gaps between the scan points were closed up to {2 * flags.reach} cells of {cube.cell:.3g}"
+            notes += (f"{gap}; a denser scan needs less",)
         if flags.unseen > NOTED_UNSEEN:
-            notes += (f"{flags.unseen:.1%} of the part's skin has no scan points and counts as intact",)
+            notes += (f"{flags.unseen:.1%} of the part's skin has no scan points and counts as intact; scan it",)
         losses = find_losses(cube, flags, aligned, sites)
         largest = max((count_box_cells(flags, nodes) for nodes, _ in losses), default=0)
         if largest * BYTES_PER_CELL > self.memory * GIB:
@@ -131,7 +132,8 @@ class Octree(EncloseAll):
                 f"cells of {wanted:.3g} need {per_leaf / wanted**2:.2g} GiB; enclose.memory is {self.memory:g}",
                 f"{_suggest_options(span, max(fits, aligned.spacing))}, or a larger enclose.memory",
             )
-        return _make_cube(part, fits), (f"cells of {fits:.3g} instead of {wanted:.3g}, to fit into enclose.memory",)
+        note = f"cells of {fits:.3g} instead of {wanted:.3g}, to fit into enclose.memory; raise it for finer ones"
+        return _make_cube(part, fits), (note,)
 
     def _classify(
         self, cube: Cube, part: Part, aligned: Scan, deviation: Deviation, sites: Sites
@@ -148,7 +150,9 @@ class Octree(EncloseAll):
                 cube = _make_cube(part, GROWTH * cube.cell)
             else:
                 break
-        note = f"cells of {cube.cell:.3g} instead of {start:.3g}, which leave holes between the points of the scan"
+        note = (
+            f"cells of {cube.cell:.3g}: finer ones, of {start:.3g}, leave holes between the points; scan more densely"
+        )
         return cube, flags, (note,) if cube.cell > start else ()
 
 
