@@ -85,6 +85,8 @@ def test_every_text_of_page_and_pdf_is_in_each_catalogue() -> None:
         for text, told in known.items():  # the compiled catalogue is that of the text file
             if isinstance(told, str):
                 assert words.tell(text) == told
+        legend = "section through the deepest point; grey: part as designed, red: damage, green: scan points"
+        assert len(words.tell(legend)) <= 90, "a longer line is cut"
 
 
 def test_a_language_without_a_catalogue_is_a_fault_of_the_job(tmp_path: Path) -> None:
