@@ -62,7 +62,7 @@ def _make_pore(engine: Engine, state: JobState, number: int) -> FoundSite | None
     evidence = weigh_evidence(solid, points, state.aligned, state.deviation, state.part, state.tolerance)
     note = (
         f"a closed pore at least {below:.3g} {state.unit} below the skin; it counts as lost, but is in no deposit or "
-        "path"
+        "path; mill down to it to fill it"
     )
     site = FoundSite(clusters=(number,), method=PORE, members=members, evidence=evidence, notes=(note,))
     return site.with_value(FoundSite.damage, solid)

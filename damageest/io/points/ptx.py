@@ -45,7 +45,7 @@ def read(path: Path, columns: str | None = None) -> PointFile:
         is_known = bool(np.linalg.norm(position - transform[3, :3]) < 1e-3 * reach)
         if not is_known:
             notes.append(
-                f"scan {len(points) + 1}: its scanner position differs from its transform; it is taken as not known"
+                f"scan {len(points) + 1}: its scanner position differs from its transform; it counts as unknown"
             )
         numbers.append(len(points) if is_known else -1)
         positions.append(transform[3, :3])

@@ -81,7 +81,7 @@ def read_earlier(
         raise InputError(f"{name}: {fault}") from None
     digest = files_sha256(paths)
     note = (
-        f"made of an earlier scan of {len(scan.points)} points, in its frame: {made.seen_area:.4g} {unit}² of skin, "
+        f"made from an earlier scan of {len(scan.points)} points, in its frame: {made.seen_area:.4g} {unit}² of skin, "
         f"noise {made.noise:.3g}, edges rounded by about {made.cell:.3g}"
     )
     return Part(

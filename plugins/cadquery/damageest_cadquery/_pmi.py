@@ -49,9 +49,7 @@ def find_pmi(text: str, faces: Mapping[int, int], scale: float) -> CadPmi:
     tolerances = (*_find_tolerances(file, aspects, systems), *_find_sizes(file, aspects))
     notes = []
     if broken:
-        notes.append(
-            f"{broken} references of datums and tolerances lead to nothing in the file: what they refer to is missing"
-        )
+        notes.append(f"{broken} references of datums and tolerances have no target in the file; export it again")
     if not datums and not tolerances:
         drawn = any(name in entity for entity in file.entities.values() for name in DRAWN)
         notes.append(

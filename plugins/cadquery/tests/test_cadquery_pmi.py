@@ -94,7 +94,7 @@ def test_datums_systems_and_tolerances_with_their_faces(tmp_path: Path) -> None:
     [
         ("", "no datums and no tolerances"),
         ("#9001=DRAUGHTING_CALLOUT('',());\n", "as drawings only"),
-        (PMI.replace("{side}", "#987654"), "references of datums and tolerances lead to nothing"),
+        (PMI.replace("{side}", "#987654"), "references of datums and tolerances have no target"),
         (PMI.replace("{side}", "#987654"), "datum B: no CAD face"),
         (PMI.replace("MEASURE_WITH_UNIT(LENGTH_MEASURE(0.6),#9902)", ""), "its amount could not be read"),
         (PMI.replace("#9003=SHAPE_ASPECT_RELATIONSHIP('',$,#9001,#9002);", ""), "datum A: no CAD face"),
