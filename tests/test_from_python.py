@@ -91,6 +91,19 @@ def test_the_thread_of_a_cancelled_run_goes_on_as_before(job: Path, tmp_path: Pa
     assert damageest.run(job).status == "ok"
 
 
+def test_a_caller_cancels_from_progress_too(job: Path) -> None:
+    """As of other libraries: by raising what a cancelled run raises."""
+
+    def stop(now: damageest.Progress) -> None:
+        if now.stage == "segment":
+            raise CancelledError
+
+    for cancel in (None, threading.Event()):
+        with pytest.raises(CancelledError) as caught:
+            damageest.run(job, progress=stop, cancel=cancel)
+        assert [record.stage for record in caught.value.so_far.stages][-1] == "align"
+
+
 def test_a_cancel_that_was_set_before_begins_nothing(job: Path) -> None:
     cancel = threading.Event()
     cancel.set()

@@ -6,9 +6,11 @@ import contextlib
 import logging
 import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from multiprocessing import resource_tracker
+from pathlib import Path
 from typing import Any
 
 from damageest.errors import InputError, StageError, describe_install
@@ -68,12 +70,29 @@ def open_client(scheduler: str, workers: int, processes: bool = True) -> Iterato
                     cluster = stack.enter_context(LocalCluster(processes=processes, **size, **fixed))
                     client = stack.enter_context(Client(cluster))
                 except RuntimeError as error:
+                    if script := find_unguarded():
+                        raise InputError(
+                            f"batch: its worker processes read {script} again, which calls it again\n"
+                            '  try: call damageest.batch below  if __name__ == "__main__":'
+                        ) from None
                     raise StageError(
                         f"batch: a worker process did not start ({error})",
                         "fewer --workers; more free memory; `damageest run` needs no worker",
                         code="memory",
                     ) from None
             yield client
+
+
+def find_unguarded() -> str:
+    """The script of this process where nothing in it depends on whether a process was started with it, or reads it
+    again; empty elsewhere."""
+    file = getattr(sys.modules.get("__main__"), "__file__", None)
+    if not file or Path(file).name == "__main__.py":  # which is not read again
+        return ""
+    try:
+        return "" if "__main__" in Path(file).read_text(encoding="utf-8", errors="replace") else str(file)
+    except OSError:
+        return ""
 
 
 @contextlib.contextmanager

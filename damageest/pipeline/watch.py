@@ -48,7 +48,8 @@ class Progress:
 
 
 class Teller:
-    """An observer that tells a caller what the stages and steps of one run do."""
+    """An observer that tells a caller what the stages and steps of one run do. CancelledError of
+    the caller ends the run."""
 
     def __init__(self, to: Callable[[Progress], object], route: Route) -> None:
         self._to, self._names = to, set(list_names(route))
@@ -67,6 +68,8 @@ class Teller:
         except Exception as error:
             if is_interrupt(error):
                 raise KeyboardInterrupt from error
+            if isinstance(error, CancelledError):
+                raise _Stop from error
             self._has_failed = True
             said = f"progress failed at {stage}: {type(error).__name__}: {clean_message(error, 400)}"
             warnings.warn(f"{said}; the run goes on, and it is not called again", RuntimeWarning, stacklevel=2)
@@ -158,12 +161,18 @@ class _Watcher:
 
 def call_with_cancel(signal: Signal | None, call: Callable[[], T]) -> T:
     """What ``call`` gives. It ends soon after ``signal`` is set, as by Ctrl-C, so that its processes end and its
-    scratch files go. Raises CancelledError then.
+    scratch files go. Raises CancelledError then, and where the
+    caller raised it when it was told the progress.
 
     It is no context manager: an interrupt between the block and the end of the watch would come out of it.
     """
     if signal is None:
-        return call()
+        try:
+            return call()
+        except KeyboardInterrupt as error:
+            if not _was_raised_by_caller(error):
+                raise
+            raise _make_cancelled(error) from error
     if signal.is_set():
         raise CancelledError
     watcher = _Watcher(signal)
@@ -175,11 +184,23 @@ def call_with_cancel(signal: Signal | None, call: Callable[[], T]) -> T:
             watcher.end()
     except KeyboardInterrupt as error:
         watcher.end()  # again, where the interrupt came before the first one had begun
-        if not signal.is_set():
+        if not signal.is_set() and not _was_raised_by_caller(error):
             raise
-        cancelled = CancelledError()
-        cancelled.so_far = getattr(error, "so_far", None)
-        raise cancelled from error
+        raise _make_cancelled(error) from error
+
+
+def _was_raised_by_caller(error: BaseException) -> bool:
+    """Whether an interrupt is a CancelledError of the caller's, raised from ``progress``."""
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, CancelledError):
+        cause = cause.__cause__
+    return cause is not None
+
+
+def _make_cancelled(error: BaseException) -> CancelledError:
+    cancelled = CancelledError()
+    cancelled.so_far = getattr(error, "so_far", None)
+    return cancelled
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import Distribution, EntryPoint, entry_points, version
+from importlib.metadata import Distribution, EntryPoint, distributions, entry_points, version
 from pathlib import Path
 from typing import Any
 
@@ -98,17 +98,88 @@ def _describe_own() -> Provider:
     return Provider(OWN, version(OWN), "Apache-2.0", "damageest.registry.builtins")
 
 
-def _list_installed() -> list[tuple[EntryPoint, Provider]]:
-    points = sorted(entry_points(group=GROUP), key=lambda p: (p.dist.name if p.dist else "", p.name))
-    return [(point, _describe_provider(point, point.dist)) for point in points]
+@dataclass(frozen=True)
+class _Faulty:
+    """Stands in for an entry point that cannot be read. Loading it says why."""
+
+    name: str
+    error: PluginError
+
+    def load(self) -> Any:
+        raise self.error
 
 
-def _describe_provider(point: EntryPoint, dist: Distribution | None) -> Provider:
+def _list_installed() -> list[tuple[EntryPoint | _Faulty, Provider]]:
+    """The entry points of all distributions. Where the metadata of one is damaged, as after an installation that was
+    interrupted, it alone is left out, or broken where it names damageest."""
+    found: list[tuple[EntryPoint | _Faulty, Provider]]
+    try:
+        found = [(point, _describe_provider(point)) for point in entry_points(group=GROUP)]
+    except Exception:  # of any package, also one that has nothing to do with damageest
+        found = [pair for dist in _list_distributions() for pair in _read_distribution(dist)]
+    return sorted(found, key=lambda pair: (pair[1].name, pair[0].name))
+
+
+def _list_distributions() -> list[Distribution]:
+    """All of them, those that come first on the path before others of their name."""
+    named = {_name_distribution(dist): dist for dist in reversed(list(distributions()))}
+    return list(named.values())
+
+
+def _read_distribution(dist: Distribution) -> list[tuple[EntryPoint | _Faulty, Provider]]:
+    try:
+        points = [point for point in dist.entry_points if point.group == GROUP]
+    except Exception as error:
+        names_us = f"[{GROUP}]" in _read_text(dist, "entry_points.txt")
+        return [_describe_faulty(dist, "its entry points", error)] if names_us else []
+    found: list[tuple[EntryPoint | _Faulty, Provider]] = []
+    for point in points:
+        try:
+            found.append((point, _describe_provider(point)))
+        except AttributeError:
+            wrong = ValueError("it is no module, nor module:object")
+            found.append(_describe_faulty(dist, f"its entry point '{point.name} = {point.value}'", wrong))
+        except Exception as error:
+            found.append(_describe_faulty(dist, f"its entry point '{point.name} = {point.value}'", error))
+    return found
+
+
+def _describe_faulty(dist: Distribution, what: str, error: Exception) -> tuple[_Faulty, Provider]:
+    name = _name_distribution(dist)
+    place = f", in {dist.locate_file('')}" if _read_text(dist, "entry_points.txt") else ""
+    fault = PluginError(
+        f"{what} cannot be read ({type(error).__name__}: {clean_message(error, 200)}){place}",
+        f"install {name} again, or delete its folder",
+    )
+    return _Faulty(what, fault), Provider(name, "?", "?", "")
+
+
+def _name_distribution(dist: Distribution) -> str:
+    """Its name; of one without metadata, that of its folder."""
+    try:
+        name = dist.metadata["Name"]
+    except Exception:
+        name = None
+    folder = Path(str(getattr(dist, "_path", "unknown"))).stem
+    return str(name) if name else folder.rpartition("-")[0] or folder
+
+
+def _read_text(dist: Distribution, name: str) -> str:
+    """A file of its metadata, as far as it can be read."""
+    path = Path(str(getattr(dist, "_path", ""))) / name
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""
+
+
+def _describe_provider(point: EntryPoint) -> Provider:
+    """Raises an exception of any kind where its metadata is damaged."""
+    dist = point.dist
     if dist is None:
         return Provider(point.name, "?", "?", point.module)
     meta = dist.metadata
     licence = next((meta[key] for key in ("License-Expression", "License") if key in meta), "not stated")
-    return Provider(dist.name, dist.version, licence.splitlines()[0], point.module)
+    return Provider(
+        str(dist.name or _name_distribution(dist)), str(dist.version or "?"), licence.splitlines()[0], point.module
+    )
 
 
 def describe_broken(error: BaseException, provider: Provider) -> Broken:

@@ -254,3 +254,18 @@ def test_an_interrupted_batch_goes_on(tmp_path: Path) -> None:
     rows = json.loads((tmp_path / "b/batch.json").read_text())["jobs"]
     assert rows[0] == first[0]
     assert {path.name for path in (tmp_path / "b").iterdir() if path.is_dir()} == {f"night-scan-{k}" for k in range(3)}
+
+
+@pytest.mark.slow
+def test_a_script_without_a_guard_is_told_of_it(tmp_path: Path) -> None:
+    """Its worker processes read the script again, and with it the call."""
+    damaged_box.write_small(tmp_path)
+    (tmp_path / "night.py").write_text("import damageest\ndamageest.batch(['job.yaml'], workers=1, output='b')\n")
+    command = [sys.executable, "night.py"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=100, check=False)
+    assert done.returncode == 1
+    last = " ".join(done.stderr.split("InputError: ")[-1].split())
+    assert last.startswith(
+        f"batch: its worker processes read {tmp_path / 'night.py'} again, which calls it again try: call"
+    )
+    assert 'below if __name__ == "__main__":' in last

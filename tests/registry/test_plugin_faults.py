@@ -145,6 +145,38 @@ def test_none_where_the_contract_has_none(site: Site, tiny_done: Path) -> None:
     assert "gave a NoneType where its contract promises Sites" in " ".join(done.output.split())
 
 
+DAMAGED = {
+    "no module": ("[damageest]\nx = \n", "Name: acme-half\nVersion: 1.2\n", "acme-half", "it is no module"),
+    "no value": ("[damageest]\nwords\n", "Name: acme-half\nVersion: 1.2\n", "acme-half", "its entry points cannot be"),
+    "no metadata": ("[damageest]\nx = acme_half\n", None, "acme_half", "No module named 'acme_half'"),
+    "no name": ("[damageest]\nx = acme_half\n", "Version: 1.2\n", "acme_half", "No module named 'acme_half'"),
+    "no text": (
+        "[damageest]\nx = acme_half\n",
+        "\ud8ff",
+        "acme_half",
+        "its entry point 'x = acme_half' cannot be read",
+    ),
+    "another's": ("[console_scripts]\nwords\n", "Name: acme-half\nVersion: 1.2\n", "", ""),
+}
+"""What an installation that was interrupted leaves: entry points, metadata, who is broken and why."""
+
+
+@pytest.mark.parametrize("case", DAMAGED)
+def test_a_damaged_installation_of_one_package_costs_that_package_alone(case: str, site: Site) -> None:
+    points, metadata, name, reason = DAMAGED[case]
+    site.add("acme-grow", GROWN)
+    info = site.folder / "acme_half-1.2.dist-info"
+    info.mkdir()
+    (info / "entry_points.txt").write_text(points)
+    if metadata is not None:
+        (info / "METADATA").write_bytes(f"Metadata-Version: 2.1\n{metadata}".encode("utf-8", "surrogatepass"))
+    registry = Registry.discover()
+    assert registry.get("allowance", "doubled").provider.name == "acme-grow"
+    broken = {one.provider.name: one.reason for one in registry.broken if "half" in one.provider.name}
+    assert list(broken) == ([name] if name else [])
+    assert reason in broken.get(name, "")
+
+
 OBSERVING = """
 @hookimpl
 def damageest_before_stage(stage):
