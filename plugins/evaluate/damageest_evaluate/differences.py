@@ -277,7 +277,7 @@ def make_difference_table(rows: Sequence[Row], command: str) -> str:
         "found (95 %)",
         "gained: true, found",
         "outcome",
-        "what is said",
+        "message",
     ]
     body = [
         [row["name"], row["part"], f"{row['overlap']:.0%}", f"{row['true']:.1f}", _tell_found(row),
