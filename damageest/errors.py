@@ -43,7 +43,7 @@ def clean_message(text: object, most: int = MOST_TEXT) -> str:
     """A text that is not damageest's own, fit to be shown: of at most ``most`` characters and a note that it was cut;
     a tab is a space, other control characters are written out, as ``\\x1b``, and 1.2e+04 is 12000. Line ends stay.
 
-    What has no text, as an exception whose ``__str__`` raises, is named by its type.
+    A value without text, for example an exception whose ``__str__`` raises, is named by its type.
     """
     try:
         whole = str(text)
@@ -135,10 +135,9 @@ class PluginError(DamageestError):
 class StageError(DamageestError):
     """A stage failed, or refused an input that is valid.
 
-    Raise it with what is wrong and, as ``remedy``, what the user may try; ``method``: another method of the job that
-    may do it, which is added to the remedy; ``topic``: of `damageest explain`. The engine adds stage and site; for
-    points that are no site yet, a description of their ``place``. ``extra``: of this package, where what is missing
-    comes with it.
+    Raise it with the fault and, as ``remedy``, what the user may try; ``method``: another method of the job that may do
+    it, which is added to the remedy; ``topic``: of `damageest explain`. The engine adds stage and site; for points that
+    are no site yet, a description of their ``place``. ``extra``: of this package, where what is missing comes with it.
     """
 
     exit_status = 1
@@ -165,9 +164,9 @@ def suggest(name: str, valid: Sequence[str]) -> str:
 
 
 def describe_install(name: str, root: Path | None = None) -> str:
-    """The command that adds a package of this project, as ``damageest-paths``, or an extra, as ``pdf``, to what is
-    installed: uv's where damageest runs in the environment of a clone, else pip's. ``root``: of the clone, by default
-    the folder above the package."""
+    """The command that adds a package of this project, for example ``damageest-paths``, or an extra, for example
+    ``pdf``, to what is installed: uv's where damageest runs in the environment of a clone, else pip's. ``root``: of the
+    clone, by default the folder above the package."""
     root = root or Path(__file__).resolve().parents[1]
     is_package = name.startswith("damageest-")
     if not (root / "plugins").is_dir():
@@ -208,7 +207,7 @@ def is_interrupt(error: BaseException) -> bool:
 
 
 def find_missing_library(error: BaseException) -> str:
-    """The shared library that an error says is missing, as in ``libGL.so.1``; empty for another error."""
+    """The shared library that an error names as missing, for example ``libGL.so.1``; empty for another error."""
     # ctypes raises OSError without a number
     if isinstance(error, ImportError) or (type(error) is OSError and error.errno is None):
         found = re.match(r"(\S+\.so\S*): cannot open shared object file", str(error))

@@ -153,10 +153,10 @@ class Result:
     sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
     volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
     high end. ``budget``: the uncertainty of that volume, source by source; ``not_in_budget``: names of sources that the
-    job does not give; ``certificate``: scanner and standard, as the job has them. ``adapted``: deformation of ``part``
-    to follow the scan; None: it is the part as designed. ``sections``: the job's sections, of the part as designed, in
-    the pose of the run. ``conversions``: conversions by plugins, see `convert`. ``scan_factor``: divisor of the lengths
-    of ``scan``, for temperature and scale, about ``scan_centre`` (3,); see `transform_to_scan` and `raw_points`.
+    job does not give; ``certificate``: scanner and standard by the job. ``adapted``: deformation of ``part`` to follow
+    the scan; None: it is the part as designed. ``sections``: the job's sections, of the part as designed, in the pose
+    of the run. ``conversions``: conversions by plugins, see `convert`. ``scan_factor``: divisor of the lengths of
+    ``scan``, for temperature and scale, about ``scan_centre`` (3,); see `transform_to_scan` and `raw_points`.
     """
 
     name: str

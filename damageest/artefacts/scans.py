@@ -59,7 +59,7 @@ class Scan(Checked):
     to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
     where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
     -1 where its scanner position is not known. Both None where no position is known. ``cloud`` (N,): the number of the
-    cloud that each point came with, as of its file: the points of one cloud do not move against each other, whether its
+    cloud of each point, for example of its file: the points of one cloud do not move against each other, whether its
     scanner position is known or not; -1 where that is not known. None: a view is a cloud. ``total``: number of points
     in the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence`` (N,) on
     the scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with, the

@@ -52,7 +52,7 @@ class _ShapeCrop(Crop):
         return self
 
     def describe(self) -> str:
-        """The crop in words: 'keep box'."""
+        """The crop as text: 'keep box'."""
         return super().describe() if self.keep else f"drop {self.drop}"
 
 

@@ -28,7 +28,7 @@ class Shape:
     ``point`` (3,): on the plane, on the axis, the apex of a cone, or the centre of a sphere. ``axis`` (3,): unit
     vector; the outward normal of a plane; of a cone, from the apex into it; 0 for a sphere. ``size``: the radius; of a
     cone, half its angle in radians; 0 for a plane. ``sign``: 1 where the outside is away from the axis or the centre,
-    as on a shaft, -1 as in a hole.
+    like on a shaft, -1 like in a hole.
     """
 
     kind: Kind

@@ -120,8 +120,8 @@ COARSE = 20_000
 
 
 def describe_coarse(points: Floats, path: Path) -> Reason | None:
-    """A warning where the coordinates (N,3) of a file, as in it, are in single precision and so far from the origin
-    that they have steps; None for others."""
+    """A warning where the coordinates (N,3) of a file are in single precision and so far from the origin that they have
+    steps; None for others."""
     known = points[np.isfinite(points).all(axis=1)]
     if not len(known) or np.abs(known).max() > np.finfo(np.float32).max:
         return None

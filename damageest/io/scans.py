@@ -40,8 +40,8 @@ def make_scan(
 
     ``viewpoints`` (V,3): scanner positions, in the unit and the frame of the points; ``view`` (N,): the number of each
     point's position, -1 where it is not known. ``viewpoints`` alone: one position (1,3) for all points. ``colours``
-    (N,3) and ``confidence`` (N,) are kept as they are. ``cloud`` (N,): the number of the cloud that each point came
-    with, as of its file; -1 where it is not known.
+    (N,3) and ``confidence`` (N,) are kept as they are. ``cloud`` (N,): the number of the cloud of each point, for
+    example of its file; -1 where it is not known.
 
     Points that are not finite or farther than 1e12 from the origin, and duplicates, are removed; the scan's notes give
     their numbers. Normals are scaled to

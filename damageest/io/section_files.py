@@ -88,8 +88,8 @@ def _to_csv(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
 @dataclass(frozen=True)
 class Drawing:
     """Lines and areas of a section on paper, y downward: ``size`` (2,) of it; ``times``: exaggeration of deviations;
-    ``areas``: closed outlines as designed; ``lines``: by what they show, as `COLOURS` has it; ``marks``: places by
-    name; ``ruler``: its ends and its length as text."""
+    ``areas``: closed outlines as designed; ``lines``: by their meaning, a key of `COLOURS`; ``marks``: places by name;
+    ``ruler``: its ends and its length as text."""
 
     size: tuple[float, float]
     times: float

@@ -36,12 +36,12 @@ class ScanFacts:
 
     ``noise``, ``spacing``: of its points. ``seen_area``: skin that the scan shows. ``is_fitted``: whether the pose was
     fitted to the scan, and no unworn skin is known to hold it. ``systematic``: standard deviation of the mean distances
-    of intact cells of the skin that noise does not explain. ``outward_area`` and ``outward_height``: skin that lies
-    outside the part by some tolerances, and by how much. ``between_views``: how far the views differ where they
-    overlap, 0 where they agree or are not known. ``sheets_share``: share of its points at which it shows two surfaces,
-    ``sheets_apart`` from each other. ``pose``: reasons that the stage align gave against its pose.
-    ``fit``: how well the part as designed explains the intact skin; None where that was not measured. ``adapted``: by
-    how much the part was deformed to follow the scan, 0 where it was not.
+    of intact cells of the skin that noise does not explain. ``outward_area`` and ``outward_height``: area and height of
+    skin outside the part by some tolerances. ``between_views``: how far the views differ where they overlap, 0 where
+    they agree or are not known. ``sheets_share``: share of its points at which it shows two surfaces, ``sheets_apart``
+    from each other. ``pose``: reasons that the stage align gave against its pose. ``fit``: how well the part as
+    designed explains the intact skin; None where that was not measured. ``adapted``: by how much the part was deformed
+    to follow the scan, 0 where it was not.
     """
 
     tolerance: float

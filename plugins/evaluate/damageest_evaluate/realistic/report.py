@@ -16,7 +16,7 @@ HEAD = (
     "undamaged", "no site", "false", "notes", "notes, most", "time, times", "time, most",
 )  # fmt: skip
 LEGEND = (
-    "right, inside, silent: as in the suite of honesty; doubted, refused: how a wrong result is reported. held: groups of "
+    "right, inside, silent: as in the suite of honesty; doubted, refused: report of a wrong result. held: groups of "
     "accepted sites whose interval holds the truth, of all. pose: error in resolutions of the sensor (standard "
     "deviation of one point), median, and within one of them, of all runs with a result. undamaged: cases without a "
     "loss; no site: those without any site; false: those with an accepted one. notes: of a run, also those that it "

@@ -14,7 +14,7 @@ HEAD = ("kind", "cases", "right", "of these unseen", "inside", "said", "doubtful
 LEGEND = (
     "right; inside (a volume is wrong, and the truth lies in its interval); said (what is wrong is doubtful, reported "
     "as lost, or refused); silent (none of these): numbers of cases. of these unseen: right cases with true damage on "
-    "skin that the result reports as unseen. doubtful, refused: how a wrong result was reported. held: groups of accepted "
+    "skin that the result reports as unseen. doubtful, refused: report of a wrong result. held: groups of accepted "
     "sites whose interval holds the truth, of all. s: median seconds of a run"
 )
 
