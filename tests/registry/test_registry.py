@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+import trimesh
 
 import damageest
 from damageest.cli._commands import load_commands
@@ -14,6 +15,7 @@ from damageest.errors import DamageestError, JobError
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.registry.hookspecs import hookimpl
+from tests import damaged_box
 from tests.needs import PLUGINS, find_obstacle, needs_plugin
 
 HEAD = "from typing import Literal\nfrom damageest.registry.hookspecs import hookimpl\n"
@@ -165,3 +167,35 @@ def test_observers_see_every_stage(tiny_done: Path) -> None:
     with pytest.raises(DamageestError):
         damageest.run(tiny_done, registry=Registry.discover([observer]))
     assert observer.seen == [("before", "part"), ("InputError", "part")]
+
+
+FIXTURE = '''
+from typing import ClassVar
+import numpy as np
+from damageest.artefacts import Part, Pose, Scan
+from damageest.stages.align import Align
+
+class Fixture(Align):
+    """The pose that the fixture holds."""
+    use: Literal["fixture"] = "fixture"
+    gives_fitted_pose: ClassVar[bool] = FITTED
+    def run(self, part: Part, scan: Scan, tolerance: float) -> Pose:
+        return Pose(np.eye(4), 0.05, 0.95, np.eye(4)[None])
+
+@hookimpl
+def damageest_stages():
+    return [Fixture]
+'''
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fitted", [False, True])
+def test_a_known_pose_of_a_stranger_counts_as_one(fitted: bool, site: Site) -> None:
+    """A whole face that is worn by 0.8 mm may be an error of a pose that was fitted, and of no other. What the run asks
+    is the class, not its name."""
+    site.add("acme-fixture", FIXTURE.replace("FITTED", str(fitted)))
+    worn = {"tool": "plane", "point": [0, 0, damaged_box.SIZE[2] / 2 - 0.8], "normal": [0, 0, 1]}
+    scan = {"use": "simulate", "points": 6000, "noise": 0.04, "seed": 3, "pose": "identity", "damage": [worn]}
+    job = {"version": 1, "tolerance": 0.4, "report": "none", "align": "fixture", "scan": scan}
+    (found,) = damageest.run(job, part=trimesh.creation.box(damaged_box.SIZE)).sites
+    assert ("wide_loss" in {reason.code for reason in found.verdict.reasons}) == fitted
