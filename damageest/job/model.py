@@ -36,7 +36,7 @@ class Box(Options):
 
 
 class SiteChoice(Options):
-    """What a person decides about the sites, by their numbers in the table of a run without these decisions."""
+    """Decisions on sites, by their numbers in the table of a run without these decisions."""
 
     drop: tuple[PositiveInt, ...] = Field((), description="numbers of sites to drop")
     merge: tuple[tuple[PositiveInt, ...], ...] = Field(
@@ -46,7 +46,7 @@ class SiteChoice(Options):
 
 
 class InspectChoice(Options):
-    """How scans after a step of the repair are judged, by `damageest inspect`."""
+    """Criteria of `damageest inspect` for scans after a repair step."""
 
     defect: float | None = Field(
         None, gt=0, description="width of the least defect that matters, in the job's unit; default: 15 tolerances"

@@ -8,7 +8,7 @@ from damageest.stages.adapt.smooth import Smooth
 
 
 class AutoAdapt(Smooth):
-    """As `smooth`, but tried only where intact skin shows a bent, twisted, stretched or scaled part.
+    """Like `smooth`, but tried only where intact skin shows a bent, twisted, stretched or scaled part.
 
     Otherwise, and where held-out patches of the scan contradict the field, the result is that of `none`, byte for byte.
     """

@@ -32,7 +32,7 @@ def _check_pairs(pairs: tuple[tuple[Point, Point], ...]) -> tuple[tuple[Point, P
 
 
 class Points(Align):
-    """Fits the pose to picked pairs of points, then to the part's triangles as `icp` does.
+    """Fits the pose to picked pairs of points, then to the part's triangles like `icp`.
 
     For scans for which `register` finds no pose, or too many. The pairs need not be exact: an error of a few percent of
     the part's size is corrected by the fit.

@@ -14,7 +14,7 @@ DEEPEST = 5.0
 
 
 class AllLoops(Boundary):
-    """All boundary loops near the part's skin: also for walls worn through and grooves round a shaft.
+    """All boundary loops near the part's skin: also for walls worn through and grooves around a shaft.
 
     Loops of ten nodes or fewer and loops deep below the skin are gaps of the scan: `enclose` closes them.
     """

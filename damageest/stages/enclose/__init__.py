@@ -16,7 +16,7 @@ class NotSeparatedError(StageError):
 
 
 class Enclose(Stage, ABC):
-    """Closes the inner damage surface (IDS) of one site to a mesh round its lost metal (paper 3.1 steps 8 to 11).
+    """Closes the inner damage surface (IDS) of one site to a mesh around its lost metal (paper 3.1 steps 8 to 11).
 
     ``refines``: set it to True where the implementation refines the background itself, or does not use it; `background`
     then makes a coarse one.

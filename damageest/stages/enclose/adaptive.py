@@ -23,9 +23,9 @@ MOST_BETWEEN = 1000
 
 
 class Adaptive(Enclose):
-    """Joins the rims to the nearest points of the background, which it refines only there (paper 5.1, future work).
+    """Joins the rims to the background, which it refines only near them (paper 5.1, future work).
 
-    Then as `shortest_path`, with paths on the refined faces. Its cost grows with the length of the rims, not with the
+    Then like `shortest_path`, with paths on the refined faces. Its cost grows with the length of the rims, not with the
     surface of the part.
     """
 

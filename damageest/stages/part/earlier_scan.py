@@ -18,10 +18,9 @@ MIN_POINTS = 1000
 
 
 class EarlierScan(ReadPart):
-    """Takes an earlier scan of the same part, also of some of its sides only: for wear between two scans.
+    """Takes an earlier scan of the same part, also a partial one: for wear between two scans.
 
-    What the earlier scan did not see is closed by a surface that stands for nothing: scan points there are set aside,
-    and it counts as unseen skin.
+    An arbitrary surface closes its gaps: they count as unseen skin, and scan points there are ignored.
     """
 
     use: Literal["earlier_scan"] = "earlier_scan"

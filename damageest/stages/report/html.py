@@ -18,8 +18,10 @@ if TYPE_CHECKING:
 
 
 class Html(Report):
-    """One page, `report.html`, that a browser opens from disk without a network: sites, 3D view, sections, checks; and
-    `report.pdf`, to be signed."""
+    """One page, `report.html`: sites, 3D view, sections and checks. It opens from disk, without a network.
+
+    `report.pdf` has the same on paper, to be signed.
+    """
 
     use: Literal["html"] = "html"
     points: int = Field(

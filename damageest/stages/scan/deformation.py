@@ -22,8 +22,8 @@ FINE = 80.0
 
 
 class Deformation(Options):
-    """How a part is deformed. Amounts are the largest displacement of its skin beyond the nearest rigid motion (least
-    squares over the skin), in the job's unit."""
+    """The deformation of a part. Amounts are the largest displacement of its skin beyond the nearest rigid motion
+    (least squares over the skin), in the job's unit."""
 
     model_config = ConfigDict(defer_build=True)
     bend: FiniteFloat = Field(0.0, description="amount by which its axis is bent to an arc")

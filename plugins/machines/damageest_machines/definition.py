@@ -105,15 +105,15 @@ class Robot(Options):
 
 
 class Command(Options):
-    """Lines of the program, and how long to wait after them, in seconds."""
+    """Lines of the program, and the wait after them, in seconds."""
 
     lines: tuple[str, ...] = ()
     wait: float = Field(0.0, ge=0)
 
 
 class Channel(Options):
-    """How a channel of the process is set: ``line`` with {value}, which is ``scale`` times what the path has, plus
-    ``offset``, with so many ``decimals``. ``least`` and ``most`` limit what the path has."""
+    """The command of a channel of the process: ``line`` with {value}, which is ``scale`` times the path's value plus
+    ``offset``, with so many ``decimals``. ``least`` and ``most`` limit the path's value."""
 
     line: str = Field(pattern=r"\{value\}")
     scale: float = 1.0
@@ -124,7 +124,7 @@ class Channel(Options):
 
 
 class Process(Options):
-    """What switches the deposition on and off, and sets its channels."""
+    """Commands that switch the deposition on and off, and set its channels."""
 
     on: Command
     off: Command
@@ -132,7 +132,7 @@ class Process(Options):
 
 
 class Post(Options):
-    """How the program is written."""
+    """The form of the program."""
 
     program: str = Field("SITE{site}", description="name of the program; {site} is the site's number")
     orientation: Literal["vectors", "axes"] = Field(

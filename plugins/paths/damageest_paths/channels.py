@@ -35,7 +35,7 @@ class Span(Options):
 
 
 class Setting(Options):
-    """One row of the table of the process: what is set, and on which passes and places of them."""
+    """One row of the process table: settings, and the passes and places where they apply."""
 
     layer: Annotated[int, Field(ge=1)] | tuple[Annotated[int, Field(ge=1)], Annotated[int, Field(ge=1)]] | None = Field(
         None, description="number of the layer, or [first, last]; 1 lies on the part's own metal; default: all"

@@ -34,7 +34,7 @@ def _check_direction(value: Literal["auto", "normal"] | Vector) -> Literal["auto
 
 
 class BeamShape(Options):
-    """What goes from the nozzle's tip to the bead: light, powder, wire or arc."""
+    """The beam from the nozzle's tip to the bead: light, powder, wire or arc."""
 
     radius: Length | None = Field(
         None, description="radius at the bead, in the job's unit; default: half the bead's width"

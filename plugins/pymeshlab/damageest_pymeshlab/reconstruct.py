@@ -17,7 +17,7 @@ MOST_LEVELS = 11
 
 
 class PyMeshLabReconstruct(Reconstruct):
-    """Reconstruction by one of PyMeshLab's filters, trimmed to where the points are.
+    """Reconstruction by one of PyMeshLab's filters, trimmed to the points.
 
     The points are first moved onto local fits. Filters: `screened_poisson` (Kazhdan and Hoppe 2013), for uneven
     density; `apss` (Guennebaud and Gross 2007), which fits spheres, and `rimls` (Oztireli et al. 2009), which keeps
