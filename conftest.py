@@ -17,6 +17,7 @@ import damageest
 from damageest.registry import Registry
 from damageest.result import Result
 from tests import damaged_box
+from tests.costs import read_nightly
 from tests.kept import keep
 
 pytest_plugins = ["tests.costs", "tests.lacking"]
@@ -27,7 +28,7 @@ settings.load_profile("untimed")
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Of a test marked ``variants(n, slow=m)`` those after the first n are slow, and of the slow ones those after the
-    first m nightly."""
+    first m nightly; so are those that `tests/nightly.txt` lists."""
     seen: Counter[str] = Counter()
     for item in items:
         if (mark := item.get_closest_marker("variants")) is None:
@@ -40,6 +41,10 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
             seen[name + " slow"] += 1
             if seen[name + " slow"] > mark.kwargs["slow"]:
                 item.add_marker(pytest.mark.nightly)
+    nightly = read_nightly()
+    for item in items:
+        if item.nodeid in nightly and item.get_closest_marker("slow"):
+            item.add_marker(pytest.mark.nightly)
 
 
 @pytest.fixture(scope="session")

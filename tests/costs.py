@@ -3,6 +3,9 @@
 A run ends with the ten dearest of the default tests. With ``--dear-fails`` (CI), those above `MOST` are run again,
 alone and without coverage, and the run fails where one is above it a second time. What a fixture takes that several
 tests share is not counted: it is not the fault of the test that comes first.
+
+Slow tests above `MOST_SLOW` are nightly: `nightly.txt` lists them, and ``--note-nightly`` writes it anew from what a
+run of slow tests took. Those of `KEPT` stay slow whatever they take.
 """
 
 from __future__ import annotations
@@ -18,11 +21,18 @@ import pytest
 
 MOST = 2.0
 """Processor seconds that a default test may take."""
+MOST_SLOW = 5.0
+"""Processor seconds that a slow test may take before it is nightly."""
+NIGHTLY = Path(__file__).with_name("nightly.txt")
+KEPT = ("tests/test_jobs.py",)
+"""Files whose slow tests are never nightly: the example jobs."""
 SHOWN = 10
 LATER = ("slow", "nightly")
 """Marks of the tests that the default run leaves out."""
 COSTS: dict[str, float] = {}
-"""Processor seconds by test, gathered where reports come together."""
+"""Processor seconds by default test, gathered where reports come together."""
+SLOW_COSTS: dict[str, float] = {}
+"""The same of slow and nightly tests."""
 _START = pytest.StashKey[tuple[float, float]]()
 _shared = 0.0  # seconds of fixtures that several tests share, so far
 
@@ -50,6 +60,9 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--dear-fails", action="store_true", help=f"fail where a default test takes more than {MOST} s twice"
     )
+    parser.addoption(
+        "--note-nightly", action="store_true", help=f"write {NIGHTLY.name} anew for the slow tests that run"
+    )
 
 
 @pytest.hookimpl(wrapper=True)
@@ -73,15 +86,28 @@ def pytest_runtest_protocol(item: pytest.Item) -> Generator[None, Any, Any]:
 @pytest.hookimpl(wrapper=True)
 def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo[None]) -> Generator[None, Any, Any]:
     report = yield
-    if call.when == "teardown" and not any(item.get_closest_marker(name) for name in LATER):
+    if call.when == "teardown":
         start, shared = item.stash[_START]
-        report.user_properties.append(("processor_seconds", count_processor_seconds() - start - (_shared - shared)))
+        name = "slow_seconds" if any(item.get_closest_marker(one) for one in LATER) else "processor_seconds"
+        report.user_properties.append((name, count_processor_seconds() - start - (_shared - shared)))
     return report
 
 
 def pytest_runtest_logreport(report: pytest.TestReport) -> None:
     if report.when == "teardown":
-        COSTS.update((report.nodeid, value) for name, value in report.user_properties if name == "processor_seconds")
+        for name, costs in (("processor_seconds", COSTS), ("slow_seconds", SLOW_COSTS)):
+            costs.update((report.nodeid, value) for given, value in report.user_properties if given == name)
+
+
+def read_nightly() -> set[str]:
+    """The names of the slow tests that are nightly since they take long."""
+    return set(NIGHTLY.read_text().splitlines()) if NIGHTLY.exists() else set()
+
+
+def note_nightly(costs: dict[str, float]) -> None:
+    """Writes the list anew: of tests with known ``costs`` those above `MOST_SLOW`, and the others as they were."""
+    dear = {name for name, seconds in costs.items() if seconds > MOST_SLOW and not name.startswith(KEPT)}
+    NIGHTLY.write_text("".join(f"{name}\n" for name in sorted((read_nightly() - costs.keys()) | dear)))
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
@@ -102,6 +128,8 @@ _DEAR = pytest.StashKey[tuple[str, ...]]()
 @pytest.hookimpl(tryfirst=True)
 def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
     config = session.config
+    if config.getoption("--note-nightly") and not hasattr(config, "workerinput"):
+        note_nightly(SLOW_COSTS)
     dear = [name for name, seconds in COSTS.items() if seconds > MOST]
     if exitstatus or not dear or hasattr(config, "workerinput") or not config.getoption("--dear-fails"):
         return

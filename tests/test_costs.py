@@ -49,6 +49,28 @@ def test_slow(): burn(0.4)
 """
 
 
+def test_slow_tests_that_take_long_are_nightly(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those that were not run stay as they were."""
+    monkeypatch.setattr(costs, "NIGHTLY", tmp_path / "nightly.txt")
+    assert costs.read_nightly() == set()
+    costs.note_nightly({"a.py::long": 9.0, "a.py::short": 1.0, "tests/test_jobs.py::example": 60.0})
+    assert costs.read_nightly() == {"a.py::long"}
+    costs.note_nightly({"b.py::long": 6.0, "c.py::short": 0.1})
+    assert costs.read_nightly() == {"a.py::long", "b.py::long"}
+    costs.note_nightly({"a.py::long": 4.0})
+    assert costs.read_nightly() == {"b.py::long"}
+
+
+def test_nightly_tests_are_there() -> None:
+    """A test that was renamed is slow again, unless its new name is noted."""
+    root = Path(__file__).parents[1]
+    shared = "".join(path.read_text() for path in (root / "damageest/conformance").glob("*.py"))
+    listed = sorted({tuple(name.partition("[")[0].split("::")) for name in costs.read_nightly()})
+    assert len(listed) > 40
+    for path, *names in listed:
+        assert f"def {names[-1]}(" in (root / path).read_text() + shared, f"{path}: {names[-1]}"
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("most", "status"), [(0.3, 1), (0.6, 0)])
 def test_a_dear_test_fails_the_run_the_second_time(most: float, status: int, tmp_path: Path) -> None:
