@@ -17,7 +17,6 @@ import damageest
 from damageest.registry import Registry
 from damageest.result import Result
 from tests import damaged_box
-from tests.costs import read_nightly
 from tests.kept import keep
 
 pytest_plugins = ["tests.costs", "tests.lacking"]
@@ -29,6 +28,8 @@ settings.load_profile("untimed")
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Of a test marked ``variants(n, slow=m)`` those after the first n are slow, and of the slow ones those after the
     first m nightly; so are those that `tests/nightly.txt` lists."""
+    from tests.costs import read_nightly  # later: pytest rewrites the plugin's assertions when it loads it
+
     seen: Counter[str] = Counter()
     for item in items:
         if (mark := item.get_closest_marker("variants")) is None:

@@ -1,7 +1,8 @@
 """Budgets of uncertainty as JCGM 100 (GUM) asks for: the errors of a volume or a depth as a table, source by source.
 
-Each source is an uncertain number of the GUM Tree Calculator (GTC, Measurement Standards Laboratory of New Zealand),
-and the volume is their sum. What all sites have in common is one number in all of them, so that it adds with its sign.
+The volume is a sum of independent inputs, each with a standard uncertainty of one and its coefficient: the combined
+uncertainty is the root of the sum of their squares (JCGM 100, 5.1.2). What all sites have in common is one input in all
+of them, so that it adds with its sign. Tests compare it with the GUM Tree Calculator.
 """
 
 from __future__ import annotations
@@ -143,19 +144,13 @@ def _list_terms(scanner: ScannerErrors, shares: Floats) -> list[_Parts]:
 
 
 def _sum_up(parts: Iterable[_Parts], bounds: Iterable[BudgetBound], correction: float) -> Budget:
-    """The budget, with the combined uncertainty and the contributions of the GUM Tree Calculator."""
-    from GTC import reporting, ureal
-
+    """The budget, with the combined uncertainty and the contributions."""
     known = {part.name: part for part in parts if part.is_told or part.columns.any()}
-    inputs = {
-        name: [(ureal(0.0, 1.0, label=name), float(c)) for c in part.columns if c] for name, part in known.items()
-    }
-    total = sum((c * x for pairs in inputs.values() for x, c in pairs), start=ureal(0.0, 0.0))
-    combined = float(total.u)
+    combined = float(np.sqrt(sum(float((part.columns**2).sum()) for part in known.values())))
     rows = []
     for name in (name for name in SOURCES if name in known):
         part, source = known[name], SOURCES[name]
-        components = [float(reporting.u_component(total, x)) for x, _ in inputs[name]]
+        components = [float(c) for c in part.columns if c]
         contribution = float(np.linalg.norm(components)) if components else 0.0
         sign = -1.0 if len(components) == 1 and components[0] < 0 else 1.0
         rows.append(

@@ -36,6 +36,7 @@ ERRORS = st.builds(
     scanner=st.lists(SIGNED, min_size=2, max_size=2).map(np.array),
     exposed=st.floats(1.0, 100.0),
 )
+SHARED = ("spacing", "rim", "form", "tessellation", "outward", "views")
 PLAIN = SiteError(100.0, 0.0, 0.0, 0.0, 0.0, scanner=np.array([2.0, 0.0]), exposed=10.0)
 
 
@@ -54,6 +55,27 @@ def test_the_expanded_uncertainty_is_half_the_interval(errors: list[SiteError]) 
     assert budget.combined**2 == pytest.approx(sum(row.contribution**2 for row in budget.rows), abs=1e-12)
     if budget.combined:
         assert sum(row.share for row in budget.rows) == pytest.approx(1.0)
+
+
+def test_two_sites_have_the_uncertainty_of_the_gum_tree_calculator() -> None:
+    """Noise and probing form are of each site alone; what is left is one input in both."""
+    from GTC import ureal
+
+    def draw(seed: int) -> SiteError:
+        rng = np.random.default_rng(seed)
+        one = {name: float(rng.uniform(1, 5)) for name in (*SHARED, "noise", "probing_form")}
+        pose, adapt, told = (rng.normal(size=count) for count in (6, 3, 2))
+        return SiteError(1000.0, excess=0.0, pose=pose, adapt=adapt, scanner=told, exposed=10.0, **one)
+
+    sites = [draw(1), draw(2)]
+    inputs = {name: ureal(0, 1) for name in (*SHARED, *range(11))}
+    total = ureal(0, 1) * 0
+    for one in sites:
+        total += one.noise * ureal(0, 1) + one.probing_form * ureal(0, 1)
+        total += sum(getattr(one, name) * inputs[name] for name in SHARED)
+        signed = np.concatenate([one.pose, one.adapt, one.scanner])
+        total += sum(float(c) * inputs[k] for k, c in enumerate(signed))
+    assert make(sites).combined == pytest.approx(total.u, rel=1e-12)
 
 
 @settings(max_examples=50)
