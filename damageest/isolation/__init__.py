@@ -3,6 +3,7 @@
 # The modules:
 # worker.py, process.py, serve.py: caller's side, one worker, its own side
 # portable.py: start of a worker on systems without inherited files
+# interpreter.py: which program runs Python in it
 # failures.py: messages of failed calls
 # transfer.py: arrays in shared memory
 # supervise.py: a process that watches its fork

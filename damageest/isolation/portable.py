@@ -21,6 +21,7 @@ from collections.abc import Callable
 from pathlib import Path
 
 from damageest.isolation.clock import TICK
+from damageest.isolation.interpreter import find_python
 from damageest.isolation.notes import Entry, Page
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.transfer import receive_bytes
@@ -45,10 +46,10 @@ def make_page() -> tuple[Page, Path]:
 def start(page: Path) -> tuple[subprocess.Popen[bytes], Callable[[float], socket.socket]]:
     """The worker's process, and a function that waits some seconds for its connection. That raises EOFError where the
     process ends before, or is late."""
-    secret = secrets.token_hex(_SIZE // 2).encode()
+    python, secret = find_python(), secrets.token_hex(_SIZE // 2).encode()
     listener = socket.create_server(("127.0.0.1", 0))
     process = subprocess.Popen(
-        [sys.executable, "-c", CODE, json.dumps(sys.path), str(listener.getsockname()[1]), str(page)],
+        [python, "-c", CODE, json.dumps(sys.path), str(listener.getsockname()[1]), str(page)],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT,

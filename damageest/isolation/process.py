@@ -20,6 +20,7 @@ from typing import Any
 from damageest.errors import StageError
 from damageest.isolation import portable, transfer
 from damageest.isolation.clock import TICK, WALL, Clock
+from damageest.isolation.interpreter import find_python
 from damageest.isolation.limits import Limits
 from damageest.isolation.notes import Page
 from damageest.isolation.one_thread import ONE_THREAD
@@ -89,13 +90,14 @@ class WorkerProcess:
 
     def _start(self) -> None:
         """Starts a process that is given the open files that it needs."""
+        python = find_python()
         self._channel, other = socket.socketpair()
         leash, self._leash = os.pipe()
         self.page = Page()
         files = (other.fileno(), leash, self.page.file)
         with other:
             self._process = subprocess.Popen(
-                [sys.executable, "-c", _CODE, json.dumps(sys.path), *map(str, files)],
+                [python, "-c", _CODE, json.dumps(sys.path), *map(str, files)],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.STDOUT,

@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -190,6 +191,36 @@ def test_parts_that_are_told_in_the_process_reach_who_watches() -> None:
     seen: set[str] = set()
     call_isolated(faults.tell_parts, {"seconds": 0.8}, worker="tests", watch=seen.add)
     assert "the deposit: face 3" in seen
+
+
+@pytest.fixture
+def inside_another_program(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """As in a CAD program with Python in it: ``sys.executable`` opens one more of its windows. Gives their list."""
+    program, windows = tmp_path / "AcmeCad", tmp_path / "windows"
+    program.write_text(f"#!/bin/sh\necho opened >> {windows}\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(sys, "executable", str(program))
+    monkeypatch.delenv("DAMAGEEST_PYTHON", raising=False)
+    return windows
+
+
+def test_a_program_that_embeds_python_is_not_started_again(inside_another_program: Path) -> None:
+    assert call_isolated(faults.tell_process, {}, worker="embedded", stays=False) != os.getpid()
+    assert not inside_another_program.exists()
+
+
+def test_without_an_interpreter_it_is_said_how_to_name_one(
+    inside_another_program: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    python = Path(sys.exec_prefix) / "bin/python3"
+    monkeypatch.setattr(sys, "exec_prefix", str(tmp_path))
+    monkeypatch.setattr(sys, "base_exec_prefix", str(tmp_path))
+    with pytest.raises(StageError, match="AcmeCad is no Python interpreter") as caught:
+        call_isolated(faults.tell_process, {}, worker="embedded", stays=False)
+    assert "set DAMAGEEST_PYTHON to a Python 3" in caught.value.remedy
+    monkeypatch.setenv("DAMAGEEST_PYTHON", str(python))
+    assert call_isolated(faults.tell_process, {}, worker="embedded", stays=False) != os.getpid()
+    assert not inside_another_program.exists()
 
 
 def test_a_process_for_one_call_ends_with_it() -> None:
