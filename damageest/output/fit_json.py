@@ -14,7 +14,7 @@ from damageest.output.base import JsonModel
 class PatchReport(JsonModel):
     size: float = Field(description="width of the patches of skin")
     deviation: float = Field(description="standard deviation of their mean distances from the part in the pose")
-    noise: float = Field(description="share of it that the noise of their points explains")
+    noise: float = Field(description="standard deviation that the noise of their points explains")
     left: float = Field(description="standard deviation after removing the form that `model` names")
 
 

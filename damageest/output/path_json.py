@@ -47,7 +47,7 @@ class PathReport(JsonModel):
     travel: float = Field(description="length of the moves between them")
     minutes: float
     wait_minutes: float = Field(
-        description="share of `minutes` in which the tool waits for neighbouring beads to cool down"
+        description="minutes of these in which the tool waits for neighbouring beads to cool down"
     )
     bead_volume: float = Field(description="volume that the passes add: length by section, that of the beads as laid")
     deposit_volume: float

@@ -57,7 +57,7 @@ class SensorReport(JsonModel):
     least_depth: float = Field(description="shallower losses cannot be seen in this scan")
     least_width: float = Field(description="narrower losses cannot be seen in this scan")
     levels: list[NoiseLevelReport] = Field(description="empty where no scanner position is known")
-    semivariogram: list[VariogramReport] = Field(description="correlation of errors by distance, nearest first")
+    semivariogram: list[VariogramReport] = Field(description="semivariance of errors by distance, nearest first")
 
 
 class ScanReport(JsonModel):

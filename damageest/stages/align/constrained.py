@@ -44,7 +44,7 @@ class RegionWeight(StrictMapping):
     """The weight of a region of the skin."""
 
     skin: Selector = Option(description="box, half_space, facing, faces, at, kind: skin of the region")
-    weight: float = Option(ge=0, le=1000, description="relative to 1 outside all regions; 0: ignored")
+    weight: float = Option(ge=0, le=1000, description="weight, relative to 1 outside all regions; 0: ignored")
 
 
 class Constrained(Align):

@@ -87,7 +87,7 @@ def find_wear(aligned: Scan, part: Part, distance: Floats, face: Ints, tolerance
     if threshold > base:
         notes = (
             f"intact surface deviates by up to {left:.3g} over whole areas (pose or form): wear shallower than "
-            f"{min(threshold, tolerance):.3g} is not found; check the pose, or set adapt: auto",
+            f"{min(threshold, tolerance):.3g} is not found; check pose and form of the part in the report",
         )
     if threshold >= tolerance:
         return Wear(none, threshold, notes)

@@ -92,7 +92,7 @@ class Robot(Options):
     reach: Reach
     speed: Above = Field(250.0, description="largest speed of the tool along its path")
     acceleration: Above = 1000.0
-    turn: Above = Field(90.0, description="largest speed of turns of the tool")
+    turn: Above = Field(90.0, description="largest turning speed of the tool, in degrees a second")
     flat: Vector = Field(
         (0.0, 0.0, 1.0),
         description="with a positioner that follows: the tool axis, away from the work, in the robot's base",
