@@ -16,10 +16,11 @@ from damageest.isolation.lost_threads import raise_lost
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.calls import call_guarded, run_stage
-from damageest.pipeline.stage_errors import locate_error, name_observer
+from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Candidate, FoundSite, JobState
 from damageest.pipeline.steps import GATHERED, Step
 from damageest.registry.contracts import DEFAULTS, Contract
+from damageest.registry.guards import name_observer
 from damageest.registry.outputs import check_output
 from damageest.registry.registry import Registry
 from damageest.result import StageRecord, StepRecord

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import traceback
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -81,11 +79,3 @@ def _explain(error: Exception, provider: str) -> StageError:
         f"--debug for the traceback; report it to the authors of {provider}, with job and inputs",
         code="faulty",
     )
-
-
-def name_observer(hook: Any, error: BaseException) -> str:
-    """The package, or the class, of the observer that an error came through."""
-    codes = {frame.f_code for frame, _ in traceback.walk_tb(error.__traceback__)}
-    found = [each for each in hook.get_hookimpls() if getattr(each.function, "__code__", None) in codes]
-    package, colon, _ = found[0].plugin_name.partition(":") if found else ("an observer", ":", "")
-    return package if colon else f"the observer {type(found[0].plugin).__qualname__}"

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import errno
+import traceback
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+from damageest.artefacts import Floats
 from damageest.errors import (
     DamageestError,
     StageError,
@@ -124,3 +128,41 @@ def _check_path_notes(given: Any, folder: Path) -> str:
     if given is None or (isinstance(given, Sequence) and all(isinstance(note, str) for note in given)):
         return ""
     return f"gave a {type(given).__name__}, and has to give a sequence of notes, or None"
+
+
+def name_observer(hook: Any, error: BaseException) -> str:
+    """The package, or the class, of the observer that an error came through."""
+    codes = {frame.f_code for frame, _ in traceback.walk_tb(error.__traceback__)}
+    found = [each for each in hook.get_hookimpls() if getattr(each.function, "__code__", None) in codes]
+    package, colon, _ = found[0].plugin_name.partition(":") if found else ("an observer", ":", "")
+    return package if colon else f"the observer {type(found[0].plugin).__name__}"
+
+
+def ask_joints(hook: Any, machine: str, poses: Floats, turns: Floats) -> Floats | None:
+    """What the first plugin that knows a robot gives by the hook damageest_kinematics; None where none does.
+
+    Raises StageError that names the plugin where it fails, or gives what are no joints (N,J) of the poses (N,4,4).
+    """
+    try:
+        found = hook(machine=machine, poses=poses, turns=turns)
+    except DamageestError:
+        raise
+    except BaseException as error:
+        if is_interrupt(error):
+            raise KeyboardInterrupt from error
+        who = name_observer(hook, error)
+        text = f"{who} failed in its hook damageest_kinematics for '{machine}': {type(error).__name__}: "
+        raise StageError(
+            text + clean_message(error, 400), f"report it to the authors of {who}", code="faulty"
+        ) from error
+    if found is None:
+        return None
+    try:
+        joints = np.asarray(found, float)
+    except (TypeError, ValueError):
+        joints = np.zeros(0)
+    if joints.ndim != 2 or len(joints) != len(poses):
+        told = f"{joints.shape} joints" if joints.size else f"a {type(found).__name__} that holds no joints"
+        text = f"the hook damageest_kinematics gave {told} for {len(poses)} poses of '{machine}'"
+        raise StageError(text, "report it to the authors of the plugin for this robot", code="faulty")
+    return joints

@@ -130,8 +130,7 @@ def check_kinematics(machine: Machine) -> None:
     from damageest import Registry
 
     turns = np.zeros((1, len(machine.rotary)))
-    hook = Registry.discover().hooks.hook.damageest_kinematics
-    if hook(machine=machine.robot.joints, poses=np.eye(4)[None], turns=turns) is None:
+    if Registry.discover().find_joints(machine.robot.joints, np.eye(4)[None], turns) is None:
         raise _refuse_joints(machine.robot.joints)
 
 
@@ -151,13 +150,14 @@ def _find_joints(machine: Machine, moves: Moves, poses: Floats, rotary: Floats) 
         return None
     from damageest import Registry
 
-    hook = Registry.discover().hooks.hook.damageest_kinematics
-    found = hook(machine=robot.joints, poses=poses, turns=rotary)
-    if found is None:
+    joints = Registry.discover().find_joints(robot.joints, poses, rotary)
+    if joints is None:
         raise _refuse_joints(robot.joints)
-    joints = np.asarray(found, float)
-    if joints.ndim != 2 or len(joints) != len(poses):
-        raise StageError(f"the hook damageest_kinematics gave {joints.shape} joints for {len(poses)} poses")
+    if joints.shape[1] < len(robot.limits):
+        raise StageError(
+            f"'{robot.joints}' has {joints.shape[1]} joints, and the machine file {len(robot.limits)} limits",
+            "one pair of robot.limits for each joint",
+        )
     if not np.isfinite(joints).all():
         wrong = np.flatnonzero(~np.isfinite(joints).all(axis=1))
         where = moves.describe(int(wrong[0]))

@@ -179,6 +179,15 @@ def test_joints_come_from_a_hook_and_are_checked(monkeypatch: pytest.MonkeyPatch
         Arm.joints[row, 4] = value
         with pytest.raises(StageError, match=words):
             build("kuka", path, robot=robot)
+    for wrong, words in (
+        (np.zeros((7, 5)), "'arm' has 5 joints, and the machine file 6 limits"),
+        (np.zeros(7), r"gave \(7,\) joints for 7 poses of 'arm'"),
+        ([["a"]] * 7, "gave a list that holds no joints for 7 poses of 'arm'"),
+        (7, "the observer Arm failed in its hook damageest_kinematics for 'arm': TypeError"),
+    ):
+        Arm.joints = wrong  # type: ignore[assignment]
+        with pytest.raises(StageError, match=words):
+            build("kuka", path, robot=robot)
     with pytest.raises(StageError, match="no plugin gives joints for 'other'"):
         build("kuka", path, robot={**robot, "joints": "other"})
 
