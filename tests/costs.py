@@ -104,10 +104,15 @@ def read_nightly() -> set[str]:
     return set(NIGHTLY.read_text().splitlines()) if NIGHTLY.exists() else set()
 
 
+def find_dear(costs: dict[str, float]) -> set[str]:
+    """The slow tests that are to be nightly."""
+    return {name for name, seconds in costs.items() if seconds > MOST_SLOW and not name.startswith(KEPT)}
+
+
 def note_nightly(costs: dict[str, float]) -> None:
     """Writes the list anew: of tests with known ``costs`` those above `MOST_SLOW`, and the others as they were."""
-    dear = {name for name, seconds in costs.items() if seconds > MOST_SLOW and not name.startswith(KEPT)}
-    NIGHTLY.write_text("".join(f"{name}\n" for name in sorted((read_nightly() - costs.keys()) | dear)))
+    names = (read_nightly() - costs.keys()) | find_dear(costs)
+    NIGHTLY.write_text("".join(f"{name}\n" for name in sorted(names)))
 
 
 def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> None:
@@ -116,6 +121,11 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.section(f"the {SHOWN} dearest of {len(COSTS)} default tests, in processor seconds")
         for name, seconds in dearest:
             terminalreporter.write_line(f"{seconds:6.2f}  {name}")
+    dear = sorted(name for name in find_dear(SLOW_COSTS) if name not in read_nightly())
+    if dear:
+        terminalreporter.section(f"slow tests above {MOST_SLOW} processor seconds that are not nightly")
+        for name in dear:
+            terminalreporter.write_line(f"{SLOW_COSTS[name]:6.2f}  {name}")
     for name in config.stash.get(_DEAR, ()):
         terminalreporter.write_line(
             f"{name} took more than {MOST} s of processor time twice: make it cheaper, or mark it slow"

@@ -36,7 +36,7 @@ from damageest_cadquery._step import OWNER
 from damageest_cadquery._worker import make_exact, write_part
 
 Given = TypeVar("Given")
-NO_FIELD = "the part was adapted to the scan by a stage that gives no field, so its CAD faces cannot follow"
+NO_FIELD = "the part was adapted to the scan by a stage without a displacement field, so its CAD faces cannot follow"
 OF_SITE = ("damage", "deposit", "milled")
 LIMIT = 120.0
 """Longest time for a site, in seconds, where no job says so."""

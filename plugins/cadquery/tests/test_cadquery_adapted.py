@@ -133,9 +133,9 @@ def test_without_a_field_sites_have_facets_and_the_part_is_refused(done: Run, tm
     blind = replace(done.result, adapted=replace(done.result.adapted, field=None))
     written = write(blind, tmp_path)
     assert not written.exact
-    assert any("no field" in note for note in written.warnings)
+    assert any("displacement field" in note for note in written.warnings)
     for what, site in (("part", None), ("undamaged", None), ("damage", 1)):
-        with pytest.raises(InputError, match="no field"):
+        with pytest.raises(InputError, match="displacement field"):
             blind.as_cadquery(what, site)
 
 
