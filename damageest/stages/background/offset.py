@@ -7,15 +7,17 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part, Surface
-from damageest.geometry.solids import to_manifold
+from damageest.geometry.distance import is_inside, signed_distance
+from damageest.geometry.solids import to_manifold, to_solid
+from damageest.stages.background._level_set import build_level_set
 from damageest.stages.background._shape import ShapeBackground
 
 
 class Offset(ShapeBackground):
     """The part's skin moved outward along its vertex normals (paper 3.2). Follows concave parts exactly.
 
-    Refused for parts with gaps narrower than twice the clearance, and for parts with vertices where opposite faces
-    meet.
+    Where it would not hold the part, as in gaps narrower than twice the clearance and at vertices where opposite faces
+    meet, it is the surface at the clearance, that of `minkowski`.
     """
 
     use: Literal["offset"] = "offset"
@@ -34,4 +36,15 @@ class Offset(ShapeBackground):
         np.add.at(right, chosen[:, 0], n)
         move = np.linalg.solve(left + 1e-3 * np.eye(3), right[:, :, None])[:, :, 0]
         move *= np.minimum(1, 3 / np.maximum(np.linalg.norm(move, axis=1), 1e-12))[:, None]
-        return to_manifold(Mesh(part.vertices + gap * move, part.faces), origin)
+        moved = to_manifold(Mesh(part.vertices + gap * move, part.faces), origin)
+        return moved if _is_round(moved, part, surface, gap, origin) else build_level_set(part, gap, origin)
+
+
+def _is_round(moved: Any, part: Part, surface: Surface, gap: float, origin: Floats) -> bool:
+    """Whether the moved skin holds the part, and what of the damage surface is nearer to it than the ``gap``."""
+    solid = to_solid(moved, origin)
+    if solid is None:
+        return False
+    points = np.concatenate([part.vertices, part.triangles.mean(axis=1), surface.vertices])
+    outside = points[~is_inside(points, solid)]
+    return not len(outside) or not bool((np.abs(signed_distance(outside, part)[0]) < gap).any())
