@@ -25,6 +25,7 @@ MODULES: Mapping[str, tuple[str, ...]] = {
     "pyvista": ("pyvista",),
     "vtk": ("vtk", "vtkmodules"),
     "pillow": ("PIL",),
+    "gtc": ("GTC",),
     "distributed": ("distributed", "dask"),
     "python-fcl": ("fcl",),
     "scikit-learn": ("sklearn",),

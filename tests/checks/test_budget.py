@@ -13,6 +13,7 @@ from damageest.checks.budget import SOURCES, make_depth_budget, make_volume_budg
 from damageest.checks.scanner import ScannerErrors, Term, leave_form, spread_of
 from damageest.checks.site_error import WIDTH, SiteError, combine_total
 from damageest.findings import Budget
+from tests.needs import import_or_skip
 
 SIZES = st.floats(0.0, 10.0)
 SIGNED = st.floats(-5.0, 5.0)
@@ -59,7 +60,7 @@ def test_the_expanded_uncertainty_is_half_the_interval(errors: list[SiteError]) 
 
 def test_two_sites_have_the_uncertainty_of_the_gum_tree_calculator() -> None:
     """Noise and probing form are of each site alone; what is left is one input in both."""
-    from GTC import ureal
+    ureal = import_or_skip("GTC").ureal
 
     def draw(seed: int) -> SiteError:
         rng = np.random.default_rng(seed)
