@@ -39,7 +39,7 @@ def test_a_part_whose_moved_skin_meets_itself_is_held() -> None:
     """The bars of a grille stand so near that moved vertices came to lie inside other bars' skin, turned inside out."""
     part = PARTS["grille"]()
     inside = Mesh(part.vertices[:3] * 0.99, np.array([[0, 1, 2]]))
-    held = Offset().run(part, inside, 0.0018 * part.diagonal, 0.003 * part.diagonal, False)
+    held = Offset().run(part, inside, 0.008 * part.diagonal, 0.003 * part.diagonal, False)
     winding = igl.fast_winding_number(np.array(held.vertices), np.array(held.faces), np.array(part.vertices))
     assert winding.min() > 0.5
     assert held.volume > part.volume
