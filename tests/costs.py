@@ -121,8 +121,7 @@ def pytest_terminal_summary(terminalreporter: Any, config: pytest.Config) -> Non
         terminalreporter.section(f"the {SHOWN} dearest of {len(COSTS)} default tests, in processor seconds")
         for name, seconds in dearest:
             terminalreporter.write_line(f"{seconds:6.2f}  {name}")
-    dear = sorted(name for name in find_dear(SLOW_COSTS) if name not in read_nightly())
-    if dear:
+    if dear := sorted(find_dear(SLOW_COSTS) - read_nightly()):
         terminalreporter.section(f"slow tests above {MOST_SLOW} processor seconds that are not nightly")
         for name in dear:
             terminalreporter.write_line(f"{SLOW_COSTS[name]:6.2f}  {name}")

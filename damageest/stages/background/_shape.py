@@ -48,7 +48,7 @@ class ShapeBackground(Background, ABC):
         solid = to_solid(body, origin)
         if solid is None:
             raise StageError("the background is empty", "background: minkowski", method="implicit")
-        return check_holds(solid, np.concatenate([part.vertices, part.triangles.mean(axis=1)]), surface)
+        return check_holds(solid, list_skin(part), surface)
 
     @abstractmethod
     def build_shape(self, part: Part, surface: Surface, gap: float, origin: Floats) -> Any:
@@ -102,12 +102,23 @@ def check_surface(surface: Surface) -> None:
         raise StageError("the damage surface is empty", "another reconstruct", method="implicit")
 
 
+def list_skin(part: Part) -> Floats:
+    """Points (N,3) on the part's skin: its vertices and the middles of its triangles."""
+    return np.concatenate([part.vertices, part.triangles.mean(axis=1)])
+
+
+def find_outside(background: Solid, skin: Floats, surface: Surface) -> Floats:
+    """The ``skin`` points (N,3) and vertices of the damage surface that do not lie inside the background (M,3)."""
+    inner = np.concatenate([skin, surface.vertices])
+    return inner[~is_inside(inner, background)]
+
+
 def check_holds(background: Solid, skin: Floats, surface: Surface) -> Solid:
     """Gives the background. Raises StageError unless the ``skin`` points (N,3) and the damage surface lie inside it."""
-    inner = np.concatenate([skin, surface.vertices])
-    if outside := int((~is_inside(inner, background)).sum()):
+    if outside := len(find_outside(background, skin, surface)):
+        count = len(skin) + len(surface.vertices)
         raise StageError(
-            f"the background does not contain part and damage surface: {outside} of {len(inner)} points lie outside it",
+            f"the background does not contain part and damage surface: {outside} of {count} points lie outside it",
             "subdivide: linear, background: minkowski",
             method="implicit",
         )

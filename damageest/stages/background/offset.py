@@ -7,10 +7,10 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Part, Surface
-from damageest.geometry.distance import is_inside, signed_distance
+from damageest.geometry.distance import signed_distance
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.stages.background._level_set import build_level_set
-from damageest.stages.background._shape import ShapeBackground
+from damageest.stages.background._shape import ShapeBackground, find_outside, list_skin
 
 
 class Offset(ShapeBackground):
@@ -45,6 +45,5 @@ def _is_round(moved: Any, part: Part, surface: Surface, gap: float, origin: Floa
     solid = to_solid(moved, origin)
     if solid is None:
         return False
-    points = np.concatenate([part.vertices, part.triangles.mean(axis=1), surface.vertices])
-    outside = points[~is_inside(points, solid)]
+    outside = find_outside(solid, list_skin(part), surface)
     return not len(outside) or not bool((np.abs(signed_distance(outside, part)[0]) < gap).any())
