@@ -11,8 +11,10 @@ run of slow tests took. Those of `KEPT` stay slow whatever they take.
 from __future__ import annotations
 
 import os
+import statistics
 import subprocess
 import sys
+import time
 from collections.abc import Generator
 from pathlib import Path
 from typing import Any
@@ -21,6 +23,8 @@ import pytest
 
 MOST = 2.0
 """Processor seconds that a default test may take."""
+REFERENCE = 0.2
+"""Processor seconds of the work of `measure_slowness` on the machine where `MOST` was set."""
 MOST_SLOW = 5.0
 """Processor seconds that a slow test may take before it is nightly."""
 NIGHTLY = Path(__file__).with_name("nightly.txt")
@@ -148,14 +152,30 @@ def pytest_sessionfinish(session: pytest.Session, exitstatus: int) -> None:
 
 
 def find_dear_again(names: list[str], root: Path) -> list[str]:
-    """Runs tests again, alone, and gives those that are above `MOST` again.
+    """Runs tests again, each alone, and gives those that are above `MOST` again, as this machine counts seconds.
 
-    They run twice in one process, and the second time counts: the first one imports libraries.
+    Each runs twice in a process of its own, and the second time counts: the first one imports libraries and starts the
+    worker that stages share.
     """
     code = (
         "import sys, pytest; from tests import costs\n"
         "for _ in range(2): pytest.main(['-q', '-n', '0', '--no-cov', *sys.argv[1:]], plugins=[])\n"
-        "print(*(name for name, seconds in costs.COSTS.items() if seconds > costs.MOST), sep='\\n')"
+        "if max(costs.COSTS.values(), default=0) > costs.MOST * costs.measure_slowness(): print('dear')"
     )
-    done = subprocess.run([sys.executable, "-c", code, *names], cwd=root, capture_output=True, text=True, check=False)
-    return [line for line in done.stdout.splitlines() if line in names]
+    dear = []
+    for name in names:
+        words = [sys.executable, "-c", code, name]
+        done = subprocess.run(words, cwd=root, capture_output=True, text=True, check=False)
+        dear += [name] if done.stdout.rstrip().endswith("dear") else []
+    return dear
+
+
+def measure_slowness() -> float:
+    """How many times longer than `REFERENCE` this machine takes for the same work now; at least 1."""
+    took = []
+    for _ in range(5):
+        start = time.process_time()
+        table = {str(k): k for k in range(200_000)}
+        sorted(table, key=lambda key: table[key] * 7919 % 100_003)
+        took.append(time.process_time() - start)
+    return max(statistics.median(took) / REFERENCE, 1.0)
