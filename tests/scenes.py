@@ -10,6 +10,7 @@ import numpy as np
 from manifold3d import Manifold
 
 from damageest.artefacts import Deviation, Floats, Mesh, Part, Samples, Scan, Sites, Solid
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_arrays
 from damageest.pipeline.skin_points import sample_near_damage
 from damageest.stages.cluster.dbscan import Dbscan
@@ -35,10 +36,14 @@ class Scene:
         names = ("part", "aligned", "deviation", "sites", "tolerance")
         return {name: getattr(self, name) for name in names}
 
+    @property
+    def field(self) -> ScanField:
+        return ScanField(self.part, self.aligned, self.deviation, self.tolerance)
+
     @cached_property
     def nearby(self) -> Samples:
         """Points on the skin near the damage."""
-        return sample_near_damage(**self.inputs(), encloser_at_once=Implicit())
+        return sample_near_damage(self.field, self.sites, Implicit())
 
     def of_sites(self) -> Floats:
         return self.aligned.points[self.sites.label > 0]

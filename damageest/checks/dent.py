@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import ADDED, Deviation, Floats, Ints, Part, Scan, Solid
+from damageest.artefacts import ADDED, Floats, Ints, Part, Solid
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.geometry.rays import measure_thickness
+from damageest.geometry.scan_field import ScanField
 
 BENDABLE = 0.5
 """Thickness of a wall, in widths of the loss, up to which it may have been bent there."""
@@ -28,7 +29,7 @@ WIDEST = 3.0
 """How far out rings are looked at, in widths of the loss."""
 
 
-def find_bent_wall(damage: Solid, part: Part, skin: SkinView, scan: Scan, deviation: Deviation, members: Ints) -> float:
+def find_bent_wall(damage: Solid, skin: SkinView, field: ScanField, members: Ints) -> float:
     """The thickness of the wall that may be dented where a loss was found; 0 where it is none, or not so.
 
     ``members`` (M,): the scan points of the loss. The wall's other side is near and was not seen, and no edge ends the
@@ -39,12 +40,12 @@ def find_bent_wall(damage: Solid, part: Part, skin: SkinView, scan: Scan, deviat
         return 0.0
     cells = skin.cells
     width = float(np.sqrt(cells.areas[own].sum()))
-    thickness, other = _look_through(part, cells.centres[own], cells.normals[own])
+    thickness, other = _look_through(field.part, cells.centres[own], cells.normals[own])
     through = np.isfinite(thickness)
     if through.mean() < 0.5 or np.median(thickness[through]) > BENDABLE * width:
         return 0.0
     nearest = find_neighbours(other[through], 1, cells.centres)[1][:, 0]
-    if skin.perhaps_seen[nearest].mean() > SEEN or _has_edge(scan, deviation, members, width):
+    if skin.perhaps_seen[nearest].mean() > SEEN or _has_edge(field, members, width):
         return 0.0
     return float(np.median(thickness[through]))
 
@@ -55,22 +56,23 @@ def _look_through(part: Part, places: Floats, normals: Floats) -> tuple[Floats, 
     return thickness, places - np.where(np.isfinite(thickness), thickness, 0.0)[:, None] * normals
 
 
-def _has_edge(scan: Scan, deviation: Deviation, members: Ints, width: float) -> bool:
+def _has_edge(field: ScanField, members: Ints, width: float) -> bool:
     """Whether a loss ends as abruptly outward as it does inward; so it does where too few points tell."""
-    is_own = np.zeros(len(scan.points), bool)
+    points, spacing = field.points, field.aligned.spacing
+    is_own = np.zeros(len(points), bool)
     is_own[members] = True
-    near = find_nearby(scan.points, scan.points[members], WIDEST * width)
-    outer = near[~is_own[near] & (deviation.label[near] != ADDED)]
+    near = find_nearby(points, points[members], WIDEST * width)
+    outer = near[~is_own[near] & (field.label[near] != ADDED)]
     if len(outer) < FEWEST or len(members) < FEWEST:
         return True
-    ring = max(0.5 * scan.spacing, 1e-9)
-    outward = find_neighbours(scan.points[outer], 1, scan.points[members])[0][:, 0]
-    inward = find_neighbours(scan.points[members], 1, scan.points[outer])[0][:, 0]
-    beside, within = -deviation.distance[outer], -deviation.distance[members]
+    ring = max(0.5 * spacing, 1e-9)
+    outward = find_neighbours(points[outer], 1, points[members])[0][:, 0]
+    inward = find_neighbours(points[members], 1, points[outer])[0][:, 0]
+    beside, within = -field.distance[outer], -field.distance[members]
     rim = float((np.mean(beside[outward < 2 * ring]) + np.mean(within[inward < 2 * ring])) / 2)
     out = _find_level(outward, beside, ring, SHALLOW * rim, falls=True)
     into = _find_level(inward, within, ring, DEEP * rim, falls=False)
-    return out <= FADES * into + FADES_SPACINGS * scan.spacing
+    return out <= FADES * into + FADES_SPACINGS * spacing
 
 
 def _find_level(away: Floats, depth: Floats, ring: float, level: float, falls: bool) -> float:

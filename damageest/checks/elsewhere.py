@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints
 from damageest.checks.coverage import SkinView
 from damageest.checks.pose_error import make_rows
+from damageest.geometry.scan_field import ScanField
 
 DAMPING = 1e-6
 """What keeps motions still that no point tells, as a share of the largest sum of squares."""
@@ -18,9 +19,7 @@ ASKED = 5000
 """Points of a site, at most, that a motion is fitted to."""
 
 
-def measure_elsewhere(
-    part: Part, aligned: Scan, deviation: Deviation, members: Ints, skin: SkinView, removed: Flags, tolerance: float
-) -> float:
+def measure_elsewhere(field: ScanField, members: Ints, skin: SkinView, removed: Flags) -> float:
     """Share of the depth of a site's points (mean squares) that one small motion of the scan explains; 0 where that
     motion puts other skin outside the part, which no wear explains.
 
@@ -30,11 +29,11 @@ def measure_elsewhere(
     if not len(members):
         return 0.0
     some = members[:: max(1, len(members) // ASKED)]
-    centre = part.bounds.mean(axis=0)
-    size = part.diagonal / 4
+    centre = field.part.bounds.mean(axis=0)
+    size = field.part.diagonal / 4
     scale = np.array([1 / size] * 3 + [1.0] * 3)
-    depth = -deviation.distance[some]
-    rows = make_rows(aligned.points[some] - centre, part.face_normals[deviation.face[some]]) * scale
+    depth = -field.distance[some]
+    rows = make_rows(field.points[some] - centre, field.find_normals(some)) * scale
     square = rows.T @ rows
     motion: Floats = np.linalg.solve(square + DAMPING * np.trace(square) * np.eye(6), rows.T @ depth)
     left = depth - rows @ motion
@@ -45,6 +44,6 @@ def measure_elsewhere(
         return explained
     before = skin.distance[other]
     after = before + (make_rows(cells.centres[other] - centre, cells.normals[other]) * scale) @ motion
-    pushed = (after > OUTSIDE * tolerance) & (before < OUTSIDE * tolerance)
+    pushed = (after > OUTSIDE * field.tolerance) & (before < OUTSIDE * field.tolerance)
     area = cells.areas[other]
     return explained if float(area[pushed].sum()) <= MOST_OUTSIDE * float(area.sum()) else 0.0

@@ -11,14 +11,12 @@ import numpy as np
 from damageest.artefacts import (
     ADDED,
     INTACT,
-    Deviation,
     Evidence,
     EvidenceCause,
     Flags,
     Floats,
     Mesh,
     Part,
-    Scan,
     Solid,
 )
 from damageest.checks.unseen_rim import face_alike
@@ -26,6 +24,7 @@ from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.point_pieces import number_pieces
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.threads import count_threads
 
@@ -40,19 +39,13 @@ UNSEEN = 0.25
 """Share of the skin beside a damage volume that may be unseen, before the other method is tried too."""
 
 
-def weigh_evidence(
-    damage: Solid, ids_points: Floats, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
-) -> Evidence:
-    """Compares one DV with the scan.
-
-    Args:
-        ids_points: (M,3) the site's IDS points. aligned, deviation: the whole scan, in the part's frame.
-    """
-    spacing = aligned.spacing
+def weigh_evidence(damage: Solid, ids_points: Floats, field: ScanField) -> Evidence:
+    """Compares one DV with the scan. ``ids_points`` (M,3): the site's IDS points; ``field``: that of the whole scan."""
+    part, spacing, tolerance = field.part, field.aligned.spacing, field.tolerance
     reach = max(2.0 * tolerance, 1.5 * spacing)
     low, high = damage.bounds[0] - 8 * reach, damage.bounds[1] + 8 * reach  # all that shows the skin beside it
-    here = find_in_box(aligned.points, low, high)
-    points, label = aligned.points[here], deviation.label[here]
+    here = find_in_box(field.points, low, high)
+    points, label = field.points[here], field.label[here]
     ids = ids_points[:: max(1, len(ids_points) // (MOST // 4))]
     residual = float(np.quantile(distance_to_mesh(ids, damage), 0.95))
 
@@ -80,9 +73,9 @@ def weigh_evidence(
         inside = len(taken)
         asked = on_skin[_measure_gap(on_skin, on_ids, 1.5 * reach) > 1.5 * reach]
         contradicted = 1 - _share_far(asked, taken, max(spacing, tolerance)) if len(asked) > 20 else 0.0
-    covered = _find_covered(aligned, deviation, part, low, high, reach)
+    covered = _find_covered(field, low, high, reach)
     unseen = _share_unseen(part, damage, inner, np.concatenate([points, covered]), on_skin, reach)
-    over = _count_intact_over(damage, inner, part, aligned, deviation, tolerance)
+    over = _count_intact_over(damage, inner, field)
     # as many as on intact skin of this area, or as many as there are points of the site: either shows intact skin
     skin_area = float(np.linalg.norm(damage.cross[~inner], axis=1).sum() / 2)
     expected = min(len(ids_points) + over, skin_area * (1.1 / spacing) ** 2 if spacing else np.inf)
@@ -109,17 +102,16 @@ def _measure_largest_gap(places: Floats, chosen: Flags, area: float, spacing: fl
     return float(np.bincount(piece).max() * each)
 
 
-def _count_intact_over(
-    damage: Solid, inner: Flags, part: Part, aligned: Scan, deviation: Deviation, tolerance: float
-) -> float:
+def _count_intact_over(damage: Solid, inner: Flags, field: ScanField) -> float:
     """How many intact scan points lie on the skin that a DV removes: those nearer to it than half a tolerance."""
-    here = find_in_box(aligned.points, damage.bounds[0] - tolerance, damage.bounds[1] + tolerance)
-    here = here[(deviation.label[here] == INTACT) & (np.abs(deviation.distance[here]) < 0.5 * tolerance)]
+    tolerance = field.tolerance
+    here = find_in_box(field.points, damage.bounds[0] - tolerance, damage.bounds[1] + tolerance)
+    here = here[(field.label[here] == INTACT) & (np.abs(field.distance[here]) < 0.5 * tolerance)]
     if not len(here):
         return 0.0
     step = max(1, len(here) // MOST)
     here = here[::step]
-    feet = aligned.points[here] - deviation.distance[here, None] * part.face_normals[deviation.face[here]]
+    feet = field.find_feet(here)
     skin_only = Mesh(damage.vertices, damage.faces[~inner])
     if not len(skin_only.faces):
         return 0.0
@@ -146,15 +138,15 @@ def _share_far(places: Floats, points: Floats, distance: float) -> float:
     return float((_measure_gap(places, points, distance) > distance).mean()) if len(places) else 0.0
 
 
-def _find_covered(aligned: Scan, deviation: Deviation, part: Part, low: Floats, high: Floats, reach: float) -> Floats:
+def _find_covered(field: ScanField, low: Floats, high: Floats, reach: float) -> Floats:
     """Places (K,3) on the skin in the box from ``low`` to ``high`` (3,) below points on added metal."""
-    added = np.flatnonzero(deviation.label == ADDED)
+    added = np.flatnonzero(field.label == ADDED)
     if not len(added):
         return np.empty((0, 3))
-    height = float(deviation.distance[added].max())
-    above = aligned.points[added]
+    height = float(field.distance[added].max())
+    above = field.points[added]
     above = above[find_in_box(above, low - height, high + height)]
-    return closest_on_mesh(above[pick_one_per_cube(above, 0.5 * reach)], part).place if len(above) else above
+    return closest_on_mesh(above[pick_one_per_cube(above, 0.5 * reach)], field.part).place if len(above) else above
 
 
 def _share_unseen(part: Part, damage: Solid, inner: Flags, points: Floats, on_skin: Floats, reach: float) -> float:

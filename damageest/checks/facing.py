@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import INTACT, Flags, Floats, Ints, Part, Scan
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, make_tree, query_neighbours
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_cubes
 
 STEP = 1.25
@@ -29,27 +30,27 @@ CHUNK = 20_000
 """Points whose neighbours are in memory at a time."""
 
 
-def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: float) -> Flags:
+def find_turned(field: ScanField) -> Flags:
     """Which points (N,) within the tolerance of the skin lie on a surface with metal on both of its sides as designed.
 
     The root of a thin wall that broke off lies within a tolerance of the wall's two faces, and the wall of a narrow
     groove within a tolerance of the skin above. At a step along the local normal of the scan, either way, the part as
     designed has metal. On intact skin one of the two places is outside.
     """
+    part, aligned, distance, tolerance = field.part, field.aligned, field.distance, field.tolerance
     turned = np.zeros(len(aligned.points), bool)
     if not (aligned.spacing and len(aligned.points) > NEIGHBOURS[0]):
         return turned
-    near = deviation.label == INTACT
-    asked = np.flatnonzero(near & (deviation.distance < -max(1.5 * aligned.noise, 0.1 * tolerance)))
-    asked = _drop_single(aligned, part, deviation, asked, tolerance)
+    near = field.label == INTACT
+    asked = np.flatnonzero(near & (distance < -max(1.5 * aligned.noise, 0.1 * tolerance)))
+    asked = _drop_single(field, asked)
     for _ in range(2):  # the second round asks the neighbours of what the first one found
         if not len(asked):
             return turned
         normals, clear = _fit_normals(aligned, asked, tolerance)
         asked, normals = asked[clear], normals[clear]
         if not turned.any():
-            skin = part.face_normals[deviation.face[asked]]
-            differs = np.abs(np.einsum("ij,ij->i", normals, skin)) < TURNED
+            differs = np.abs(np.einsum("ij,ij->i", normals, field.find_normals(asked))) < TURNED
             asked, normals = asked[differs], normals[differs]
         turned[asked[_is_buried(aligned.points[asked], normals, part, tolerance)]] = True
         if not turned.any():
@@ -57,28 +58,26 @@ def find_turned(aligned: Scan, part: Part, deviation: Deviation, tolerance: floa
         found = np.flatnonzero(turned)
         reach = 2 * aligned.spacing
         around = find_nearby(aligned.points, aligned.points[found], reach)
-        around = around[near[around] & ~turned[around] & (deviation.distance[around] < 0)]
+        around = around[near[around] & ~turned[around] & (distance[around] < 0)]
         gap = find_neighbours(aligned.points[around], 1, aligned.points[found], reach)[0]
         asked = around[np.isfinite(gap).ravel()]
     return turned
 
 
-def _drop_single(aligned: Scan, part: Part, deviation: Deviation, asked: Ints, tolerance: float) -> Ints:
+def _drop_single(field: ScanField, asked: Ints) -> Ints:
     """Those of the points ``asked`` (A,) that noise alone does not explain: on another surface most points lie deep, on
     the skin a few. All where the scan is too sparse to tell.
 
     Points are counted in cubes of the skin below them: a border between cubes within the noise would part deep points
     from the others.
     """
-    edge = min(3 * aligned.spacing, 2 * tolerance)
-    if edge < 2 * aligned.spacing or not len(asked):
+    spacing = field.aligned.spacing
+    edge = min(3 * spacing, 2 * field.tolerance)
+    if edge < 2 * spacing or not len(asked):
         return asked
-    near = deviation.label == INTACT
+    near = field.label == INTACT
     around = np.flatnonzero(near)
-    feet = part.face_normals[deviation.face[around]]
-    feet *= -deviation.distance[around, None]
-    feet += aligned.points[around]
-    place, count = group_integers(number_cubes(feet, edge)[1])[1:]
+    place, count = group_integers(number_cubes(field.find_feet(around), edge)[1])[1:]
     deep = np.zeros(len(near), bool)
     deep[asked] = True
     deep = deep[around]

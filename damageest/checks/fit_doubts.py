@@ -8,10 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from damageest.artefacts import ADDED, Deviation, Pose, Scan
+from damageest.artefacts import ADDED, Pose
 from damageest.checks.coverage import SkinView
 from damageest.checks.scan_facts import FEWEST_OUTSIDE
 from damageest.findings import Surplus, Verdict
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import measure_area
 
 LARGE = 0.1
@@ -23,15 +24,14 @@ BY_FORM = frozenset({"nothing", "wide_loss"})
 
 def find_fit_doubts(
     pose: Pose, verdicts: Mapping[int, Verdict], surplus: tuple[Surplus, ...], displaced: frozenset[int],
-    aligned: Scan, deviation: Deviation, skin: SkinView,
+    field: ScanField, skin: SkinView,
 ) -> tuple[str, ...]:  # fmt: skip
     """Reasons to doubt that the part as designed explains the intact skin, as clauses of a sentence; empty where there
     is none.
 
     Args:
         verdicts: of the sites, by their numbers. displaced: the numbers of sites beside a piece that may be displaced.
-        aligned, deviation, skin: the scan in the part's frame, its points' labels after strays were taken out, and
-            what it shows of the skin.
+        field, skin: that of the scan after strays were taken out, and what it shows of the skin.
     """
     found = []
     if pose.doubts:
@@ -44,13 +44,13 @@ def find_fit_doubts(
     if by_form:
         names = f"site{'s' if len(by_form) > 1 else ''} {', '.join(map(str, by_form))}"
         found.append(f"{names} may be deviating skin without damage")
-    outside = deviation.label == ADDED
+    outside = field.label == ADDED
     for one in surplus:
         if one.kind == "surroundings":
             outside[one.points] = False
     seen = float(skin.cells.areas[skin.perhaps_seen].sum())
     if outside.any():
-        area = measure_area(aligned.points[outside], skin.cells.edge, FEWEST_OUTSIDE)
+        area = measure_area(field.points[outside], skin.cells.edge, FEWEST_OUTSIDE)
         if area > LARGE * max(seen, 1e-300):
             found.append(f"an area of {area / max(seen, 1e-300):.0%} of the seen skin lies outside the part")
     return tuple(found)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part
 from damageest.checks.two_sheets import LEAST_NOISE
 from damageest.geometry.neighbourhoods import find_neighbours
+from damageest.geometry.scan_field import ScanField
 
 LEAST_SHARE = 0.05
 """Share of the scan's points that a site has at least, for it to be what a view shows."""
@@ -26,25 +27,25 @@ many neighbours on the same face. One face that is worn evenly, and a journal th
 by a motion as well; two faces that are worn alike are hardly."""
 
 
-def is_one_motion(aligned: Scan, deviation: Deviation, part: Part, members: Ints, tolerance: float) -> bool:
+def is_one_motion(field: ScanField, members: Ints) -> bool:
     """Whether one motion explains the points ``members`` (M,) of a site, over several faces of the part."""
-    if len(members) < LEAST_SHARE * len(aligned.points) or len(members) < 100:
+    if len(members) < LEAST_SHARE * len(field.points) or len(members) < 100:
         return False
     some = members[:: max(1, len(members) // ASKED)]
-    normals = part.face_normals[deviation.face[some]]
-    at = aligned.points[some] - aligned.points[some].mean(axis=0)
+    normals = field.find_normals(some)
+    at = field.points[some] - field.points[some].mean(axis=0)
     rows = np.concatenate([np.cross(at / np.abs(at).max(), normals), normals], axis=1)
-    distance, used = deviation.distance[some], np.ones(len(some), bool)
+    distance, used = field.distance[some], np.ones(len(some), bool)
     scatter, left = np.inf, np.abs(distance)
     for _ in range(ROUNDS):
         motion = np.linalg.lstsq(rows[used], distance[used], rcond=None)[0]
         left = np.abs(distance - rows @ motion)
         scatter = 1.4826 * float(np.median(left))
         used = left <= 3 * scatter
-    most = OFF * max(aligned.noise, LEAST_NOISE * tolerance)
+    most = OFF * max(field.aligned.noise, LEAST_NOISE * field.tolerance)
     if scatter > most or float(used.mean()) < KEPT:
         return False
-    face = _number_faces(part)[deviation.face[some]]
+    face = _number_faces(field.part)[field.deviation.face[some]]
     around = face[find_neighbours(at, AROUND + 1, at)[1]]
     is_main = face == np.bincount(face).argmax()
     is_other = ~is_main & (around == face[:, None]).all(axis=1)

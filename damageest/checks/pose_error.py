@@ -11,8 +11,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from damageest.artefacts import INTACT, OUTLIER, Deviation, Flags, Floats, FreeMotion, Part, Scan
+from damageest.artefacts import INTACT, Flags, Floats, FreeMotion
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_faced_cubes
 
 PATCH = 1 / 15
@@ -113,10 +114,7 @@ class PoseError:
 
 
 def measure_pose_error(
-    part: Part,
-    aligned: Scan,
-    deviation: Deviation,
-    tolerance: float,
+    field: ScanField,
     form: float = 0.0,
     spread: Floats | None = None,
     held: bool = False,
@@ -125,7 +123,7 @@ def measure_pose_error(
     """The error that the intact points leave to the pose.
 
     Args:
-        aligned, deviation: the scan in the part's frame, N points. tolerance: in the job's unit.
+        field: that of the whole scan, N points.
         form: standard deviation by which the skin is known to deviate; the measured one where it is larger.
         spread: (6,K) errors of a pose that was fitted to datums, as in `Pose`: not all of the skin fixes it.
         held: whether the pose was given: no error of the scan moves it.
@@ -134,16 +132,18 @@ def measure_pose_error(
     No direction of the pose is taken to be worse than the tolerance: a larger error would show as damage. Turning a
     part of revolution about its axis changes no volume, though no point fixes it.
     """
+    part, noise, tolerance = field.part, field.aligned.noise, field.tolerance
     centre = part.bounds.mean(axis=0)
     edge = PATCH * part.diagonal
     radius = max(part.diagonal / 4, 1e-12)
     scale = np.diag([1 / radius] * 3 + [1.0] * 3)
-    mean, places, rows, height, count = _average_patches(part, aligned, deviation, centre, edge)
+    intact = field.label == INTACT
+    mean, places, rows, height, count = _average_patches(field, intact, centre, edge)
     if len(mean) < FEWEST_PATCHES:
         return PoseError(centre, tolerance * scale, max(form, 0.0), edge**2)
     rows = rows @ scale
     prior = np.eye(6) / tolerance**2
-    variance = np.maximum(aligned.noise**2 / count, (1e-6 * part.diagonal) ** 2)
+    variance = np.maximum(noise**2 / count, (1e-6 * part.diagonal) ** 2)
     motion: Floats = np.zeros(6)
     systematic, left, weights = 0.0, mean, np.ones(len(mean))
     for _ in range(ROUNDS):
@@ -162,9 +162,8 @@ def measure_pose_error(
     elif fixing is None:
         answers = _find_answers(rows, height, weights / (variance + systematic**2), prior) @ scale
     else:
-        kept = Deviation(deviation.distance, deviation.face, np.where(fixing, deviation.label, OUTLIER))
-        _, _, own_rows, own_height, own_count = _average_patches(part, aligned, kept, centre, edge)
-        answers = _find_answers(own_rows @ scale, own_height, own_count / max(aligned.noise, 1e-9) ** 2, prior) @ scale
+        _, _, own_rows, own_height, own_count = _average_patches(field, intact & fixing, centre, edge)
+        answers = _find_answers(own_rows @ scale, own_height, own_count / max(noise, 1e-9) ** 2, prior) @ scale
     information = (rows / (variance + systematic**2)[:, None]).T @ rows + prior
     covariance = np.linalg.inv(information)
     values, vectors = np.linalg.eigh(covariance)
@@ -190,21 +189,21 @@ def make_rows(places: Floats, normals: Floats) -> Floats:
 
 
 def _average_patches(
-    part: Part, aligned: Scan, deviation: Deviation, centre: Floats, edge: float
+    field: ScanField, chosen: Flags, centre: Floats, edge: float
 ) -> tuple[Floats, Floats, Floats, Floats, Floats]:
-    """Mean distance (P,) of patches of intact skin, their places (P,3), mean rows (P,6) of `make_rows`, mean height
-    (P,) along the normal over the centre, and number of points (P,)."""
-    index = np.flatnonzero(deviation.label == INTACT)
+    """Mean distance (P,) of patches of the ``chosen`` (N,) points, their places (P,3), mean rows (P,6) of `make_rows`,
+    mean height (P,) along the normal over the centre, and number of points (P,)."""
+    index = np.flatnonzero(chosen)
     step = max(1, -(-len(index) // MOST_POINTS))
     index = index[::step]
     if not len(index):
         return np.empty(0), np.empty((0, 3)), np.empty((0, 6)), np.empty(0), np.empty(0)
-    normals = part.face_normals[deviation.face[index]]
-    places = aligned.points[index] - centre
+    normals = field.find_normals(index)
+    places = field.points[index] - centre
     _, number = number_faced_cubes(places, normals, edge)
     _, group, count = group_integers(number)
     rows = make_rows(places, normals)
-    mean = np.bincount(group, weights=deviation.distance[index]) / count
+    mean = np.bincount(group, weights=field.distance[index]) / count
     height = np.bincount(group, weights=np.einsum("ij,ij->i", places, normals)) / count
     mean_places, mean_rows = (
         np.stack([np.bincount(group, weights=column) for column in values.T], axis=1) / count[:, None]

@@ -6,12 +6,13 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from damageest.artefacts import ADDED, Deviation, Part, Pose, Scan
+from damageest.artefacts import ADDED, Pose
 from damageest.checks.coverage import SkinView
 from damageest.checks.skin_cells import AVERAGED
 from damageest.checks.two_sheets import Sheets
 from damageest.checks.view_overlap import compare_views
-from damageest.findings import ModelFit, Surplus
+from damageest.findings import Surplus
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import measure_area
 from damageest.rules import ScanFacts
 
@@ -24,18 +25,21 @@ LAYER = 5.0
 
 
 def gather_scan_facts(
-    skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: Iterable[Surplus], pose: Pose,
-    fit: ModelFit | None, tolerance: float, unit: str, is_fitted: bool, sheets: Sheets, adapted: float,
-) -> ScanFacts:  # fmt: skip
-    """Measures how far skin deviates that is not damaged. ``surplus``: higher one is left out, since it is metal."""
-    layer = (deviation.label == ADDED) & (deviation.distance < LAYER * tolerance)
+    field: ScanField, skin: SkinView, surplus: Iterable[Surplus], sheets: Sheets, pose: Pose, is_fitted: bool, unit: str
+) -> ScanFacts:
+    """Measures how far skin deviates that is not damaged.
+
+    ``surplus``: higher one is left out, since it is metal. ``is_fitted``: whether the scan decides the ``pose``.
+    """
+    aligned, tolerance = field.aligned, field.tolerance
+    layer = (field.label == ADDED) & (field.distance < LAYER * tolerance)
     for one in surplus:
         if one.height > LAYER * tolerance or one.kind == "surroundings":
             layer[one.points] = False
     area, height = 0.0, 0.0
     if layer.any():
         area = measure_area(aligned.points[layer], skin.cells.edge, FEWEST_OUTSIDE)
-        height = float(np.quantile(deviation.distance[layer], 0.9))
+        height = float(np.quantile(field.distance[layer], 0.9))
     return ScanFacts(
         tolerance=tolerance,
         spacing=aligned.spacing,
@@ -46,12 +50,10 @@ def gather_scan_facts(
         systematic=_measure_systematic(skin, aligned.noise),
         outward_area=area,
         outward_height=height,
-        between_views=compare_views(part, aligned, deviation, skin.cells.edge, tolerance),
+        between_views=compare_views(field, skin.cells.edge),
         sheets_share=sheets.share,
         sheets_apart=sheets.apart,
         pose=pose.doubts,
-        fit=fit,
-        adapted=adapted,
     )
 
 

@@ -9,11 +9,12 @@ from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
+from damageest.artefacts import INTACT, Floats, Scan
 from damageest.checks.pose_error import PoseError
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.noise import find_least_depth
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
@@ -32,14 +33,15 @@ NEEDED = 10
 """Points that have to lie deeper than the tolerance beside each other for a site, as stage cluster asks for."""
 
 
-def measure_levels(part: Part, aligned: Scan, deviation: Deviation) -> tuple[NoiseLevel, ...]:
+def measure_levels(field: ScanField) -> tuple[NoiseLevel, ...]:
     """The noise of intact skin by incidence and by distance from the scanner, of points whose scanner position is
     known."""
+    aligned = field.aligned
     if aligned.viewpoints is None or aligned.view is None or not aligned.spacing:
         return ()
-    index = np.flatnonzero(deviation.label == INTACT)
+    index = np.flatnonzero(field.label == INTACT)
     index = index[:: max(1, -(-len(index) // MOST_POINTS))]
-    normals, distance = part.face_normals[deviation.face[index]], deviation.distance[index]
+    normals, distance = field.find_normals(index), field.distance[index]
     edge = EDGE * aligned.spacing * float(np.sqrt(max(1.0, len(aligned.points) / MOST_POINTS)))
     _, group, count = group_integers(number_faced_cubes(aligned.points[index], normals, edge)[1])
     mean = np.bincount(group, weights=distance) / count

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import ADDED, Deviation, Part, Scan
+from damageest.artefacts import ADDED
 from damageest.checks.site_error import WIDTH
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import measure_local_areas
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
@@ -16,25 +17,23 @@ MOST = 200_000
 """Points that are averaged."""
 
 
-def limit_shallow_loss(
-    part: Part, aligned: Scan, deviation: Deviation, tolerance: float, least_width: float = 0.0
-) -> float:
+def limit_shallow_loss(field: ScanField, least_width: float = 0.0) -> float:
     """The most metal that may be lost though no site is found, in the cube of the part's unit.
 
     What patches of the scan lie below the skin by more than noise explains, times two, since the other skin of a thin
     wall may be the nearer one, and at most the tolerance; and one loss as wide and deep as the ``least_width``.
     """
     narrow = np.pi / 4 * least_width**3
-    index = np.flatnonzero(deviation.label != ADDED)
+    index = np.flatnonzero(field.label != ADDED)
     index = index[:: max(1, len(index) // MOST)]
     if not len(index):
         return float(narrow)
-    points, distance = aligned.points[index], deviation.distance[index]
+    points, distance, aligned = field.points[index], field.distance[index], field.aligned
     area = measure_local_areas(points)
-    edge = EDGE * max(aligned.spacing, 1e-6 * part.diagonal)
-    patch, count = group_integers(number_faced_cubes(points, part.face_normals[deviation.face[index]], edge)[1])[1:]
+    edge = EDGE * max(aligned.spacing, 1e-6 * field.part.diagonal)
+    patch, count = group_integers(number_faced_cubes(points, field.find_normals(index), edge)[1])[1:]
     size = np.bincount(patch, weights=area)
     mean = np.bincount(patch, weights=distance) / count
     noise = aligned.noise / np.sqrt(count)
-    depth = np.where(mean < -WIDTH * noise, np.minimum(-2 * mean, tolerance), 0.0)
+    depth = np.where(mean < -WIDTH * noise, np.minimum(-2 * mean, field.tolerance), 0.0)
     return float(size @ depth + WIDTH * np.linalg.norm(size * noise) + narrow)

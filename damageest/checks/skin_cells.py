@@ -7,9 +7,10 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Mesh, Part, Scan
+from damageest.artefacts import ADDED, INTACT, Flags, Floats, Ints, Mesh, Part, Scan
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
+from damageest.geometry.scan_field import ScanField
 
 MOST_CELLS = 20_000
 """Cells that the skin is cut into, about; more where the part has more triangles than this."""
@@ -88,9 +89,7 @@ def cut_skin(part: Part, spacing: float) -> SkinCells:
     return SkinCells(mesh, parent, edge)
 
 
-def find_seen(
-    cells: SkinCells, part: Part, aligned: Scan, deviation: Deviation, tolerance: float
-) -> tuple[Flags, Flags, Floats]:
+def find_seen(cells: SkinCells, field: ScanField) -> tuple[Flags, Flags, Floats]:
     """Whether the scan shows each cell (F,); whether it perhaps does (F,), at the edge of what it shows; and the mean
     signed distance (F,) of the points on it, NaN without points.
 
@@ -98,16 +97,16 @@ def find_seen(
     count for skin that faces as the skin nearest to them. The area that a point stands for reaches beyond the edge of
     what was scanned; it is removed again.
     """
+    part, aligned, tolerance = field.part, field.aligned, field.tolerance
     count = len(cells.areas)
-    intact = np.flatnonzero(deviation.label == INTACT)
+    intact = np.flatnonzero(field.label == INTACT)
     seen, perhaps, mean = np.zeros(count, bool), np.zeros(count, bool), np.full(count, np.nan)
     if len(intact):
         # more than some points for each cell would show nothing more
         apart = max(0.35 * max(tolerance, aligned.spacing), cells.edge / 6)
         chosen = intact[pick_one_per_cube(aligned.points[intact], apart)]
-        facing = part.face_normals[deviation.face[chosen]]
         # the places on the skin below the points: how far they are from it does not matter here
-        points = aligned.points[chosen] - deviation.distance[chosen, None] * facing
+        facing, points = field.find_normals(chosen), field.find_feet(chosen)
         reach = np.minimum(_measure_reach(points, cells.centres), SPARSE * part.diagonal)
         usual = float(np.median(reach))
         reach = np.minimum(reach, 3 * usual) + cells.edge / 3
@@ -118,11 +117,11 @@ def find_seen(
         gap, index = find_neighbours(places, AVERAGED, among, float(reach.max()) * 1.001)
         seen[asked] = gap[:, 0] <= reach[asked]
         near = np.isfinite(gap)
-        distance = np.append(deviation.distance[chosen], 0.0)[index]  # the index of a missing neighbour is the last
+        distance = np.append(field.distance[chosen], 0.0)[index]  # the index of a missing neighbour is the last
         mean[asked] = np.where(near, distance, 0.0).sum(axis=1) / np.maximum(near.sum(axis=1), 1)
         seen, perhaps = _trim_edges(cells, seen, usual + cells.edge / 3, weight)
         seen &= ~_faces_away(cells, aligned)
-    covered = _find_covered(cells, aligned, deviation, max(2 * tolerance, 1.5 * aligned.spacing))
+    covered = _find_covered(cells, field, max(2 * tolerance, 1.5 * aligned.spacing))
     mean[~perhaps] = np.nan
     return seen | covered, perhaps | covered, mean
 
@@ -164,16 +163,16 @@ def _trim_edges(cells: SkinCells, seen: Flags, reach: float, weight: float) -> t
     return gap > MARGIN * reach, gap > NARROW_MARGIN * reach
 
 
-def _find_covered(cells: SkinCells, aligned: Scan, deviation: Deviation, reach: float) -> Flags:
+def _find_covered(cells: SkinCells, field: ScanField, reach: float) -> Flags:
     """Which cells (F,) lie under added metal: an added point is above them, about as far as it is from the skin."""
-    added = np.flatnonzero(deviation.label == ADDED)
+    added = np.flatnonzero(field.label == ADDED)
     covered = np.zeros(len(cells.areas), bool)
     if not len(added):
         return covered
-    added = added[pick_one_per_cube(aligned.points[added], 0.5 * reach)]
-    gap, index = find_neighbours(cells.centres, 1, aligned.points[added])
+    added = added[pick_one_per_cube(field.points[added], 0.5 * reach)]
+    gap, index = find_neighbours(cells.centres, 1, field.points[added])
     index = added[index[:, 0]]
-    way = aligned.points[index] - cells.centres
+    way = field.points[index] - cells.centres
     above = np.einsum("ij,ij->i", way, cells.normals) > 0.5 * gap[:, 0]
-    covered[above & (gap[:, 0] < deviation.distance[index] + reach)] = True
+    covered[above & (gap[:, 0] < field.distance[index] + reach)] = True
     return covered

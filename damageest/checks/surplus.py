@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Floats, Ints, Part, Scan, Sites, Solid
+from damageest.artefacts import Floats, Ints, Part, Scan, Sites, Solid
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.findings import Surplus
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import measure_area, measure_bounds
@@ -70,14 +71,13 @@ class _Patch:
         return measure_bounds(self.points)
 
 
-def describe_surplus(
-    clusters: Sites, losses: Sites, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
-) -> tuple[Surplus, ...]:
+def describe_surplus(clusters: Sites, losses: Sites, field: ScanField) -> tuple[Surplus, ...]:
     """The surplus that each of the ``clusters`` of points outside the skin is, in their order, without solids.
 
-    ``losses``: the clusters of damaged points. Scan and deviation are in the part's frame.
+    ``losses``: the clusters of damaged points.
     """
-    cell = max(tolerance, 1.5 * aligned.spacing)
+    part, aligned = field.part, field.aligned
+    cell = max(field.tolerance, 1.5 * aligned.spacing)
     found: list[Surplus] = []
     if not clusters.count:
         return ()
@@ -90,11 +90,11 @@ def describe_surplus(
             points=members,
             share=len(members) / len(aligned.points),
             solid=None,
-            height=float(deviation.distance[members].max()),
+            height=float(field.distance[members].max()),
             area=patch.covered,
             estimate=patch.covered * patch.mean,
         )
-        found.append(_name_kind(surplus, patch, deviation, aligned, part, patches, tolerance))
+        found.append(_name_kind(surplus, patch, patches, field))
     return tuple(found)
 
 
@@ -156,12 +156,10 @@ def close_surplus(
     return replace(surplus, solid=solid, area=on_skin or surplus.area, notes=notes)
 
 
-def _name_kind(
-    surplus: Surplus, patch: _Patch, deviation: Deviation, aligned: Scan, part: Part, losses: dict[int, _Patch],
-    tolerance: float,
-) -> Surplus:  # fmt: skip
+def _name_kind(surplus: Surplus, patch: _Patch, losses: dict[int, _Patch], field: ScanField) -> Surplus:
+    part, tolerance = field.part, field.tolerance
     far = max(NEAR * tolerance, FAR * part.diagonal)
-    beyond = float((deviation.distance[surplus.points] > far).mean())
+    beyond = float((field.distance[surplus.points] > far).mean())
     is_flat = _is_plane(patch.points, tolerance)
     if beyond > FAR_SHARE or (is_flat and patch.covered < 0.35 * patch.area):
         what = "it may be a fixture, a table or another object"
@@ -170,7 +168,8 @@ def _name_kind(
         elif _resembles(patch, part):
             what = "it has the size and the area of the part, and may be a second specimen of it"
         return replace(surplus, kind="surroundings", notes=(what,), estimate=0.0)
-    beside = {number: loss for number, loss in losses.items() if _is_beside(patch, loss, tolerance, aligned.spacing)}
+    spacing = field.aligned.spacing
+    beside = {number: loss for number, loss in losses.items() if _is_beside(patch, loss, tolerance, spacing)}
     surplus = replace(surplus, clusters=tuple(beside))
     like: list[tuple[int, ...]] = [(number,) for number, loss in losses.items() if _is_alike(patch, [loss])]
     like = [one for one in like if one[0] in beside or _is_opposite(patch, losses[one[0]])]

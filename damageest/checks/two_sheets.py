@@ -7,9 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan, Solid
+from damageest.artefacts import Flags, Floats, Ints, Solid
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import extract_ids
 
 NEIGHBOURS = 12
@@ -66,14 +67,7 @@ class SheetPlaces(NamedTuple):
     below: Floats
 
 
-def measure_two_sheets(
-    aligned: Scan,
-    deviation: Deviation,
-    part: Part,
-    members: Ints,
-    tolerance: float,
-    damage: Solid | None = None,
-) -> float:
+def measure_two_sheets(field: ScanField, members: Ints, damage: Solid | None = None) -> float:
     """Share of a site's points ``members`` (M,) where the scan shows another surface above them, on the skin.
 
     At the rim of a loss points of both kinds lie side by side. Where two views do not fit together, or one surface was
@@ -82,69 +76,67 @@ def measure_two_sheets(
     """
     if len(members) < NEIGHBOURS:
         return 0.0
-    margin = 3 * tolerance + 3 * aligned.spacing
-    low, high = aligned.points[members].min(axis=0) - margin, aligned.points[members].max(axis=0) + margin
-    near = find_in_box(aligned.points, low, high)
+    tolerance, points = field.tolerance, field.points
+    margin = 3 * tolerance + 3 * field.aligned.spacing
+    low, high = points[members].min(axis=0) - margin, points[members].max(axis=0) + margin
+    near = find_in_box(points, low, high)
     step = max(1, len(members) // MOST_ASKED)
     asked = members[::step]
-    is_double, upper, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
+    is_double, upper, apart = _find_double(field, asked, near)
     is_double &= upper < ON_SKIN * tolerance
     if damage is not None:
         walls = is_double & (apart > WALL * tolerance)
-        is_double[walls] = _faces_skin(aligned, deviation, part, asked[walls], damage)
+        is_double[walls] = _faces_skin(field, asked[walls], damage)
     return float(is_double.mean()) if step * is_double.sum() >= FEWEST_POINTS else 0.0
 
 
-def _faces_skin(aligned: Scan, deviation: Deviation, part: Part, index: Ints, damage: Solid) -> Flags:
+def _faces_skin(field: ScanField, index: Ints, damage: Solid) -> Flags:
     """Whether the inner surface at each of the points (K,) faces the nearest skin, across the metal that is lost."""
-    floor = extract_ids(damage, part)
+    floor = extract_ids(damage, field.part)
     if not len(floor.faces) or not len(index):
         return np.ones(len(index), bool)
-    _, face, _ = closest_on_mesh(aligned.points[index], floor)
-    return np.asarray(np.einsum("ij,ij->i", floor.face_normals[face], part.face_normals[deviation.face[index]]) > 0)
+    _, face, _ = closest_on_mesh(field.points[index], floor)
+    return np.asarray(np.einsum("ij,ij->i", floor.face_normals[face], field.find_normals(index)) > 0)
 
 
-def measure_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> Sheets:
+def measure_sheets(field: ScanField) -> Sheets:
     """How much of the whole scan shows two surfaces, wherever they lie."""
-    return find_sheets(aligned, deviation, part, tolerance).sheets
+    return find_sheets(field).sheets
 
 
-def find_sheets(aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> SheetPlaces:
+def find_sheets(field: ScanField) -> SheetPlaces:
     """Where the whole scan shows two surfaces."""
-    near = np.flatnonzero(np.abs(deviation.distance) < LAYER * tolerance)
+    near = np.flatnonzero(np.abs(field.distance) < LAYER * field.tolerance)
     nothing = np.empty(0)
     if len(near) < NEIGHBOURS:
         return SheetPlaces(Sheets(), near[:0], nothing, nothing)
-    rng, spacing = np.random.default_rng(0), aligned.spacing
+    rng, spacing = np.random.default_rng(0), field.aligned.spacing
     if len(near) > MOST_COMPARED:
         share = MOST_COMPARED / len(near)
         near, spacing = near[rng.random(len(near)) < share], spacing / np.sqrt(share)
     asked = rng.permutation(near)[:ALL_ASKED]
-    aligned = replace(aligned, spacing=float(spacing))
-    is_double, upper, apart = _find_double(aligned, deviation, part, asked, near, tolerance)
+    thinned = replace(field, aligned=replace(field.aligned, spacing=float(spacing)))
+    is_double, upper, apart = _find_double(thinned, asked, near)
     if not is_double.any():
         return SheetPlaces(Sheets(), near[:0], nothing, nothing)
     sheets = Sheets(float(is_double.mean()), float(np.quantile(apart[is_double], 0.9)))
     return SheetPlaces(sheets, asked[is_double], upper[is_double], apart[is_double])
 
 
-def _find_double(
-    aligned: Scan, deviation: Deviation, part: Part, asked: Ints, near: Ints, tolerance: float
-) -> tuple[Flags, Floats, Floats]:
+def _find_double(field: ScanField, asked: Ints, near: Ints) -> tuple[Flags, Floats, Floats]:
     """Which of the points ``asked`` (A,) lie among two surfaces of points of ``near`` (N,), the depth (A,) of the upper
     one and how far below it the lower one lies (A,)."""
-    noise = max(aligned.noise, LEAST_NOISE * tolerance)
-    weight = FACING * max(aligned.spacing, 1e-300)
-    is_asked_straight, is_near_straight = (
-        _is_straight(aligned, deviation, part, index, STRAIGHT * tolerance) for index in (asked, near)
-    )
+    tolerance = field.tolerance
+    noise = max(field.aligned.noise, LEAST_NOISE * tolerance)
+    weight = FACING * max(field.aligned.spacing, 1e-300)
+    is_asked_straight, is_near_straight = (_is_straight(field, index, STRAIGHT * tolerance) for index in (asked, near))
     near = near[is_near_straight]
     if len(near) < NEIGHBOURS:
         nothing = np.zeros(len(asked))
         return nothing > 0, nothing, nothing
-    feet, own = (_find_feet(aligned, deviation, part, index, weight) for index in (near, asked))
+    feet, own = (_find_faced_feet(field, index, weight) for index in (near, asked))
     index = find_neighbours(own, NEIGHBOURS, feet)[1]
-    depth, offset = -deviation.distance[near][index], feet[index] - own[:, None]
+    depth, offset = -field.distance[near][index], feet[index] - own[:, None]
     # two surfaces are split at the widest gap between the depths
     ordered = np.sort(depth, axis=1)
     gaps = np.diff(ordered, axis=1)[:, FEWEST - 1 : NEIGHBOURS - FEWEST]
@@ -165,11 +157,11 @@ def _find_double(
     return is_double, upper, lower - upper
 
 
-def _is_straight(aligned: Scan, deviation: Deviation, part: Part, index: Ints, most: float) -> Flags:
+def _is_straight(field: ScanField, index: Ints, most: float) -> Flags:
     """Which points lie straight over or under their nearest triangle, and not beside an edge of it."""
-    face = deviation.face[index]
-    height = np.einsum("ij,ij->i", aligned.points[index] - part.take_triangles(face)[:, 0], part.face_normals[face])
-    return np.asarray(np.abs(height - deviation.distance[index]) < most)
+    corner = field.part.take_triangles(field.deviation.face[index])[:, 0]
+    height = np.einsum("ij,ij->i", field.points[index] - corner, field.find_normals(index))
+    return np.asarray(np.abs(height - field.distance[index]) < most)
 
 
 def _measure_spread(values: Floats, chosen: Flags) -> tuple[Floats, Floats]:
@@ -184,8 +176,6 @@ def _find_middle(offset: Floats, chosen: Flags) -> Floats:
     return np.asarray((offset * chosen[..., None]).sum(axis=1) / np.maximum(chosen.sum(axis=1), 1)[:, None])
 
 
-def _find_feet(aligned: Scan, deviation: Deviation, part: Part, index: Ints, weight: float) -> Floats:
+def _find_faced_feet(field: ScanField, index: Ints, weight: float) -> Floats:
     """(K,6) the places on the skin below points, and the weighted normals of the skin there."""
-    normals = part.face_normals[deviation.face[index]]
-    places = aligned.points[index] - deviation.distance[index, None] * normals
-    return np.concatenate([places, weight * normals], axis=1)
+    return np.concatenate([field.find_feet(index), weight * field.find_normals(index)], axis=1)

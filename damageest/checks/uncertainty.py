@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -52,6 +53,29 @@ MOST = 50_000
 """Scan points whose largest depth is taken."""
 
 
+@dataclass(frozen=True, eq=False)
+class Loss:
+    """A loss as it was found: its volume ``damage``, which of its faces (F,) are on the ``inner`` surface, as
+    `find_inner_faces` gives them, its scan ``points`` (M,3) in the part's frame, what the scan says of the volume, and
+    how that lies ``beyond`` its points."""
+
+    damage: Solid
+    inner: Flags
+    points: Floats
+    evidence: Evidence
+    beyond: BeyondPoints
+
+
+@dataclass(frozen=True, eq=False)
+class ScanErrors:
+    """The errors that all sites of a scan have in common: of the ``pose``, what the ``facts`` say about skin that
+    deviates, and what certificate and temperature say of the ``scanner``."""
+
+    pose: PoseError
+    facts: ScanFacts
+    scanner: ScannerErrors
+
+
 class _Place(NamedTuple):
     """``depth`` of a place ``at`` (3,) below the lost skin, and the outward ``normal`` (3,) of that;
     ``measured``: the largest depth of a scan point; ``rise``: by how much those nearest to it are less deep."""
@@ -64,25 +88,19 @@ class _Place(NamedTuple):
 
 
 def measure_site_error(
-    damage: Solid, inner: Flags, part: Part, aligned: Scan, members: Floats, evidence: Evidence, pose: PoseError,
-    scan: ScanFacts, beyond: BeyondPoints, form: float = 0.0, free: Sequence[FreeMotion] = (),
-    adapted: AdaptedPart | None = None, scanner: ScannerErrors | None = None,
+    loss: Loss, part: Part, aligned: Scan, errors: ScanErrors, form: float, free: Sequence[FreeMotion],
+    adapted: AdaptedPart | None,
 ) -> SiteError | None:  # fmt: skip
     """The errors of one site; None where no scan point lies on its inner surface.
 
     Args:
-        inner: (F,) which faces of ``damage`` are on its inner surface, as `find_inner_faces` gives them.
-        members: (M,3) its scan points, in the part's frame.
-        scan: what the whole scan says about skin that deviates.
-        beyond: how the damage volume lies against its points.
         form: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
             gives it; where it is less than what the intact skin shows, the latter counts.
         free: motions that the scan does not exclude.
-        scanner: what its certificate and the temperature say.
     """
-    scanner = scanner or ScannerErrors()
-    tolerance = scan.tolerance
-    surface = measure_inner_surface(damage, inner, members, aligned.noise, aligned.spacing, tolerance)
+    damage, inner, points, evidence, beyond = loss.damage, loss.inner, loss.points, loss.evidence, loss.beyond
+    pose, scan, scanner, tolerance = errors.pose, errors.facts, errors.scanner, errors.facts.tolerance
+    surface = measure_inner_surface(damage, inner, points, aligned.noise, aligned.spacing, tolerance)
     if surface is None or inner.all():
         return None
     area = np.linalg.norm(damage.cross, axis=1) / 2
@@ -98,7 +116,7 @@ def measure_site_error(
     outward = _limit_outward(scan, skin_area)
     curved = _measure_curved(damage, skin, area) if part.tessellation_error else 0.0
     hole = evidence.ids_gap if evidence.ids_gap > GAP * max(tolerance, aligned.spacing) ** 2 else 0.0
-    deepest = _find_deepest(damage, inner, part, members, 3 * max(surface.gap, tolerance))
+    deepest = _find_deepest(damage, inner, part, points, 3 * max(surface.gap, tolerance))
     by_pose = pose.of_distance(deepest.at, deepest.normal)
     bent, bent_depth = measure_adapt(adapted, damage, skin, area, deepest)
     has_other = adapted is not None and adapted.other is not None

@@ -7,13 +7,14 @@ from typing import Literal
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Floats, Ints, Part, Scan
+from damageest.artefacts import Floats, Ints, Part, Scan
 from damageest.checks.form_fields import FieldFrame, choose_frame
 from damageest.checks.form_fit import Skin, make_motion
-from damageest.checks.view_joint import JointFit, fit_jointly
+from damageest.checks.view_joint import JointFit, ViewPoints, fit_jointly
 from damageest.findings import ViewFit
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import pick_one_per_cube
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_faced_cubes
 
@@ -89,22 +90,22 @@ class ViewFits:
                 scanners[seen] = move_points(aligned.viewpoints[seen], move)
         return replace(aligned, points=points, viewpoints=scanners)
 
-    def find_explained(self, part: Part, aligned: Scan, deviation: Deviation, members: Ints, tolerance: float) -> float:
+    def find_explained(self, field: ScanField, members: Ints) -> float:
         """Share of the points ``members`` (M,) of a site that a misplaced view explains: its own motion, which was not
         made, brings them onto the skin; or nothing shows how far that view is off there, and it may be as far as they
         are deep."""
         if not self.disagree or not len(members):
             return 0.0
-        depth, label = -deviation.distance[members], self.label[members]
+        depth, label, tolerance = -field.distance[members], self.label[members], field.tolerance
         explained = np.zeros(len(members), bool)
         for one in self.views:
             own = label == one.number
             if not own.any():
                 continue
-            at, normals = aligned.points[members[own]], part.face_normals[deviation.face[members[own]]]
+            at, normals = field.points[members[own]], field.find_normals(members[own])
             if one.is_elsewhere and not one.is_corrected:
                 back = move_points(at, self.moves[one.number])
-                explained[own] |= signed_distance(back, part)[0] > -tolerance
+                explained[own] |= signed_distance(back, field.part)[0] > -tolerance
             is_near = depth[own] < EXPLAINED * one.apart
             if one.is_elsewhere and self.frame is not None:
                 rows = self.frame.list_motions(at, normals)
@@ -162,7 +163,8 @@ def fit_views(
     width = max(NARROWEST * tolerance, BY_NOISE * aligned.noise)
     many = np.bincount(view, minlength=count) >= FEWEST_POINTS
     used = many[view]
-    fit = fit_jointly(skin, frame, points[used], view[used], count, gap, width, REACH * tolerance, tolerance)
+    seen = ViewPoints(points[used], view[used], count)
+    fit = fit_jointly(skin, frame, seen, gap, width, REACH * tolerance, tolerance)
     if fit is None:
         return replace(agreed, views=_describe_unfitted(known), disagree=True)
     fit = _hold_doubtful(fit, np.where(many, known, 0.0), least)

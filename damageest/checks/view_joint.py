@@ -31,6 +31,20 @@ FOLDS = 4
 
 
 @dataclass(frozen=True, eq=False)
+class ViewPoints:
+    """Points (N,3) of a scan in the part's frame, the ``view`` (N,) of each, and the ``count`` of views."""
+
+    points: Floats
+    view: Ints
+    count: int
+
+    def move(self, moves: Floats) -> ViewPoints:
+        """The points after the motions (V,4,4) of their views."""
+        points = np.einsum("nij,nj->ni", moves[self.view, :3, :3], self.points) + moves[self.view, :3, 3]
+        return ViewPoints(points, self.view, self.count)
+
+
+@dataclass(frozen=True, eq=False)
 class Pairs:
     """Means over the points of one view in one cell of the skin, P of them: ``cell``, ``view``, ``patch`` (P,),
     ``offset`` (P,) from the skin, positive outside, ``jacobian`` (P,6), ``count`` (P,) of points. ``is_shared`` (P,):
@@ -88,12 +102,10 @@ class JointFit:
         return np.array([make_motion(twist, self.frame) for twist in self.twists]).reshape(-1, 4, 4)
 
 
-def pair_views(
-    skin: Skin, frame: FieldFrame, points: Floats, view: Ints, gap: float, reach: float, tolerance: float
-) -> Pairs:
-    """The pairs of points (N,3) of views (N,) that lie within ``reach`` of the skin, straight over it."""
-    over, places, normals, offset = skin.find_over(points, reach, tolerance)
-    points, view = points[over], view[over]
+def pair_views(skin: Skin, frame: FieldFrame, seen: ViewPoints, gap: float, reach: float, tolerance: float) -> Pairs:
+    """The pairs of points of views that lie within ``reach`` of the skin, straight over it."""
+    over, places, normals, offset = skin.find_over(seen.points, reach, tolerance)
+    points, view = seen.points[over], seen.view[over]
     if not len(points):
         none = np.empty(0, np.int64)
         return Pairs(none, none, none, np.empty(0), np.empty((0, 6)), np.empty(0), np.empty(0, bool))
@@ -113,21 +125,18 @@ def pair_views(
 
 
 def fit_jointly(
-    skin: Skin, frame: FieldFrame, points: Floats, view: Ints, count: int, gap: float, width: float,
-    reach: float, tolerance: float,
-) -> JointFit | None:  # fmt: skip
-    """Fits ``count`` views to each other and to the part, with a kernel that narrows to ``width`` (multi-view ICP with
-    the part as one of the views; graduated non-convexity, Blake and Zisserman 1987). ``points`` (N,3) and their
-    ``view`` (N,) in the part's frame. None where too little skin is seen."""
-    before = pair_views(skin, frame, points, view, gap, reach, tolerance)
+    skin: Skin, frame: FieldFrame, seen: ViewPoints, gap: float, width: float, reach: float, tolerance: float
+) -> JointFit | None:
+    """Fits views to each other and to the part, with a kernel that narrows to ``width`` (multi-view ICP with the part
+    as one of the views; graduated non-convexity, Blake and Zisserman 1987). None where too little skin is seen."""
+    count, before = seen.count, pair_views(skin, frame, seen, gap, reach, tolerance)
     if len(before.cell) < 12:
         return None
     moves = np.tile(np.eye(4), (count, 1, 1))
     pairs, wide = before, width
     for factor in WIDTHS:
         wide = max(factor * tolerance, width)
-        moved = np.einsum("nij,nj->ni", moves[view, :3, :3], points) + moves[view, :3, 3]
-        pairs = pair_views(skin, frame, moved, view, gap, reach, tolerance)
+        pairs = pair_views(skin, frame, seen.move(moves), gap, reach, tolerance)
         if len(pairs.cell) < 12:
             return None
         twists = np.zeros((count, 6))

@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Floats, Ints, Part, Scan
+from damageest.artefacts import INTACT, Floats, Ints
 from damageest.checks.view_fit import number_views
 from damageest.geometry.neighbourhoods import find_in_box
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_faced_cubes
 
 AGREE = 0.6
@@ -31,14 +32,14 @@ class _Means(NamedTuple):
     points: Floats
 
 
-def compare_views(part: Part, aligned: Scan, deviation: Deviation, edge: float, tolerance: float) -> float:
+def compare_views(field: ScanField, edge: float) -> float:
     """How far the mean distances of the views differ in cubes of width ``edge`` that several views show; 0 where they
     agree."""
-    view = number_views(aligned)
+    view = number_views(field.aligned)
     if view is None:
         return 0.0
-    used = np.flatnonzero((view >= 0) & (np.abs(deviation.distance) < LAYER * tolerance))
-    means = _average(part, aligned, deviation, view, used, edge)
+    used = np.flatnonzero((view >= 0) & (np.abs(field.distance) < LAYER * field.tolerance))
+    means = _average(field, view, used, edge)
     if not len(means.cube):
         return 0.0
     low, high = np.full(int(means.cube.max()) + 1, np.inf), np.full(int(means.cube.max()) + 1, -np.inf)
@@ -48,19 +49,19 @@ def compare_views(part: Part, aligned: Scan, deviation: Deviation, edge: float, 
     if shared.sum() < FEWEST_CUBES:
         return 0.0
     apart = (high - low)[shared]
-    return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * tolerance else 0.0
+    return float(np.quantile(apart, 0.98)) if float(np.quantile(apart, 0.8)) > AGREE * field.tolerance else 0.0
 
 
-def compare_at_site(part: Part, aligned: Scan, deviation: Deviation, members: Ints, edge: float) -> float:
+def compare_at_site(field: ScanField, members: Ints, edge: float) -> float:
     """The standard deviation of a view against the others on intact skin beside the points ``members`` (M,) of a site,
     beyond what noise explains; 0 where only one view shows it."""
-    view = number_views(aligned)
+    view = number_views(field.aligned)
     if view is None or not len(members):
         return 0.0
-    margin, own = BESIDE * edge, aligned.points[members]
-    near = find_in_box(aligned.points, own.min(axis=0) - margin, own.max(axis=0) + margin)
-    near = near[(view[near] >= 0) & (deviation.label[near] == INTACT)]
-    means = _average(part, aligned, deviation, view, near, edge)
+    margin, own = BESIDE * edge, field.points[members]
+    near = find_in_box(field.points, own.min(axis=0) - margin, own.max(axis=0) + margin)
+    near = near[(view[near] >= 0) & (field.label[near] == INTACT)]
+    means = _average(field, view, near, edge)
     if not len(means.cube):
         return 0.0
     cubes = np.bincount(means.cube)
@@ -70,20 +71,20 @@ def compare_at_site(part: Part, aligned: Scan, deviation: Deviation, members: In
     cube, mean, count = means.cube[shared], means.mean[shared], means.points[shared]
     number = cubes[cube]
     middle = np.bincount(cube, mean) / np.maximum(np.bincount(cube), 1)
-    noise = deviation.distance[near].std()
+    noise = field.distance[near].std()
     found = ((mean - middle[cube]) ** 2 * number / (number - 1)).mean()
-    return float(np.sqrt(max(found - (min(noise, aligned.noise) ** 2 / count).mean(), 0.0)))
+    return float(np.sqrt(max(found - (min(noise, field.aligned.noise) ** 2 / count).mean(), 0.0)))
 
 
-def _average(part: Part, aligned: Scan, deviation: Deviation, view: Ints, used: Ints, edge: float) -> _Means:
+def _average(field: ScanField, view: Ints, used: Ints, edge: float) -> _Means:
     """The mean distance of the ``used`` (U,) points of each view (N,) in each cube, of one side of a wall, where it has
     some."""
     if not len(used):
         return _Means(np.empty(0, np.int64), np.empty(0), np.empty(0))
-    normals = part.face_normals[deviation.face[used]]
-    cube = np.unique(number_faced_cubes(aligned.points[used], normals, edge)[1], return_inverse=True)[1]
+    number = number_faced_cubes(field.points[used], field.find_normals(used), edge)[1]
+    cube = np.unique(number, return_inverse=True)[1]
     count = int(view.max()) + 1
     pair, group, size = np.unique(cube * count + view[used], return_inverse=True, return_counts=True)
-    mean = np.bincount(group, weights=deviation.distance[used]) / size
+    mean = np.bincount(group, weights=field.distance[used]) / size
     many = size >= FEWEST_OF_VIEW
     return _Means(pair[many] // count, mean[many], size[many].astype(np.float64))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.checks.form_fields import FieldFrame
 from damageest.checks.form_fit import Skin, weigh
 from damageest.checks.two_sheets import LEAST_NOISE, find_sheets
@@ -22,8 +22,8 @@ from damageest.checks.view_fit import (
     number_views,
 )
 from damageest.checks.view_joint import PER_CELL, PER_PATCH, deal_patches
-from damageest.geometry.distance import signed_distance
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_cubes, number_faced_cubes
 
 ASKED, LEAST_POINTS = 40_000, 1000
@@ -244,9 +244,7 @@ def _separate_by_sheets(
     skin: Skin, part: Part, aligned: Scan, points: _Points, width: float, tolerance: float
 ) -> Ints | None:
     """The view (N,) of each point, 0 for the upper surface and 1 for the lower, -1 for points on neither."""
-    some = aligned.take(points.index)
-    distance, face = signed_distance(some.points, part)
-    sheets = find_sheets(some, Deviation(distance, face, np.zeros(len(face), np.uint8)), part, tolerance)
+    sheets = find_sheets(ScanField.measure(part, aligned.take(points.index), tolerance))
     if sheets.sheets.share < OF_SCAN:
         return None
     double = sheets.places

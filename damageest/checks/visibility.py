@@ -10,10 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan, Solid
+from damageest.artefacts import INTACT, Flags, Floats, Ints, Solid
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours, pick_one_per_cube
 from damageest.geometry.rays import RayCaster, prepare_rays
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import extract_ids, find_inner_faces
 from damageest.geometry.vectors import spread_directions
 
@@ -39,9 +40,7 @@ class Visibility(NamedTuple):
     turned: float = 0.0
 
 
-def measure_visibility(
-    damage: Solid, part: Part, aligned: Scan, deviation: Deviation, members: Floats, tolerance: float
-) -> Visibility:
+def measure_visibility(damage: Solid, field: ScanField, members: Floats) -> Visibility:
     """From where the inner surface below the points ``members`` (M,3) of a site can be seen, in the part without its
     damage volume, against from where the intact skin beside it was seen.
 
@@ -49,20 +48,21 @@ def measure_visibility(
     """
     if len(members) < FEWEST:
         return Visibility()
+    part, tolerance = field.part, field.tolerance
     floor, is_inner = extract_ids(damage, part), find_inner_faces(damage, part)
-    beside = _find_beside(aligned, deviation, members, BESIDE * max(tolerance, aligned.spacing))
+    grain = max(tolerance, field.aligned.spacing)
+    beside = _find_beside(field, members, BESIDE * grain)
     if not is_inner.any() or is_inner.all() or len(beside) < FEWEST:
         return Visibility()
-    few = members[pick_one_per_cube(members, max(tolerance, aligned.spacing))]
+    few = members[pick_one_per_cube(members, grain)]
     few = few[:: max(1, -(-len(few) // PLACES))]
     distance, face, foot = closest_on_mesh(few, floor)
-    near = distance < max(tolerance, aligned.spacing)
+    near = distance < grain
     if near.sum() < FEWEST:
         return Visibility()
     into, ways = floor.face_normals[face[near]], spread_directions(WAYS)
     from_skin = prepare_rays(part)
-    normals = part.face_normals[deviation.face[beside]]
-    skin = aligned.points[beside] - deviation.distance[beside, None] * normals + OFF * tolerance * normals
+    skin = field.find_feet(beside) + OFF * tolerance * field.find_normals(beside)
     looked = _look_out(skin, ways, lambda start, way: ~_is_hit(from_skin, start, way)).mean(axis=0) > SEEN_BY
     body = RayCaster(damage)
 
@@ -78,17 +78,17 @@ def measure_visibility(
     return Visibility(float(is_shut.mean()), float((~is_shut & ~seen[:, looked].any(axis=1)).mean()))
 
 
-def _find_beside(aligned: Scan, deviation: Deviation, members: Floats, reach: float) -> Ints:
+def _find_beside(field: ScanField, members: Floats, reach: float) -> Ints:
     """Intact points near those of a site, evenly spread."""
-    low, high = members.min(axis=0) - reach, members.max(axis=0) + reach
-    index: Ints = find_in_box(aligned.points, low, high)
-    index = index[deviation.label[index] == INTACT]
+    points, low, high = field.points, members.min(axis=0) - reach, members.max(axis=0) + reach
+    index: Ints = find_in_box(points, low, high)
+    index = index[field.label[index] == INTACT]
     if not len(index):
         return index
-    index = index[np.isfinite(find_neighbours(aligned.points[index], 1, members, reach)[0][:, 0])]
+    index = index[np.isfinite(find_neighbours(points[index], 1, members, reach)[0][:, 0])]
     if not len(index):
         return index
-    index = index[pick_one_per_cube(aligned.points[index], reach / BESIDE)]
+    index = index[pick_one_per_cube(points[index], reach / BESIDE)]
     return index[:: max(1, -(-len(index) // PLACES))]
 
 

@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Deviation, Floats, Part, Pose, Samples, Scan
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples, Scan
 from damageest.checks.model_fit import AskedFit, measure_fit
 from damageest.checks.two_sheets import measure_sheets
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
@@ -109,16 +110,15 @@ def ask_form(state: JobState) -> tuple[AskedFit, bool]:
     Where views lie apart, a form has to be larger than that: a field would follow the views."""
     step = max(1, len(state.aligned.points) // MEASURED)
     some = state.aligned.take(np.arange(0, len(state.aligned.points), step))
-    distance, face = signed_distance(some.points, state.part)
-    found = measure_fit(state.part, some.points, distance, some.noise, state.tolerance, state.unit, state.views)
+    field = ScanField.measure(state.part, some, state.tolerance)
+    found = measure_fit(state.part, some.points, field.distance, some.noise, state.tolerance, state.unit, state.views)
     asked = AskedFit(found, state.tolerance, some.noise)
     if found is None or found.fit.model not in ASKING:
         return asked, False
-    deviation = Deviation(distance, face, np.zeros(len(distance), np.uint8))
-    sheets = measure_sheets(some, deviation, state.part, state.tolerance)
+    sheets = measure_sheets(field)
     if sheets.share <= OF_SCAN or not len(some.points):
         return asked, True
-    form = np.quantile(np.abs(found.predict(some.points, state.part.face_normals[face])), 0.9)
+    form = np.quantile(np.abs(found.predict(some.points, state.part.face_normals[field.deviation.face])), 0.9)
     return asked, bool(form > BEYOND_VIEWS * sheets.apart)
 
 

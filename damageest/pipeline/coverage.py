@@ -10,19 +10,21 @@ from damageest.checks.facing import find_turned
 from damageest.checks.ray_evidence import trace_rays
 from damageest.checks.skin_cells import cut_skin, find_seen
 from damageest.findings import Coverage
+from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.state import FoundSite
 from damageest.pipeline.steps import step
 
 
 @step(gives=("skin", "deviation"))
-def inspect_skin(part: Part, aligned: Scan, deviation: Deviation, tolerance: float) -> tuple[SkinView, Deviation]:
+def inspect_skin(field: ScanField) -> tuple[SkinView, Deviation]:
     """Maps what the scan shows of the skin, and labels as damage the points that lie on no skin: those that face
     another way, and those that rays reached through lost metal."""
-    label = deviation.label.copy()
-    label[find_turned(aligned, part, deviation, tolerance)] = DAMAGE
-    deviation = replace(deviation, label=label)
+    part, aligned, tolerance = field.part, field.aligned, field.tolerance
+    label = field.label.copy()
+    label[find_turned(field)] = DAMAGE
+    deviation = replace(field.deviation, label=label)
     cells = cut_skin(part, aligned.spacing)
-    seen, perhaps_seen, distance = find_seen(cells, part, aligned, deviation, tolerance)
+    seen, perhaps_seen, distance = find_seen(cells, replace(field, deviation=deviation))
     rays = trace_rays(part, cells, seen, perhaps_seen, aligned, tolerance)
     if rays is not None:
         rooted = deviation.label.copy()

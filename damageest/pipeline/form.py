@@ -8,22 +8,21 @@ from typing import overload
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Deviation, Flags, Floats, Ints, Part, Pose, Reason, Scan
-from damageest.checks.coverage import SkinView
+from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Part, Pose, Reason, Scan
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit, describe_view_of
 from damageest.checks.model_fit import AskedFit, FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
 from damageest.checks.view_split import separate_views
-from damageest.findings import Explained, Surplus
+from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.geometry.noise import measure_noise_and_spacing
+from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.adapt import drop_settled, fit_pose
-from damageest.pipeline.state import FoundSite, Reasons
+from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.stages.align import Align
 from damageest.stages.scan import ReadScan
 
 MEASURED = 40_000
@@ -37,16 +36,19 @@ REMEDIES = {
 """What to do about a fit that is not as designed; the words of the others have it."""
 
 
-@step(gives=("views", "pose", "aligned", "noise", "spacing", "tolerance", "warnings"))
-def correct_views(
-    part: Part, pose: Pose, aligned: Scan, noise: float, spacing: float, tolerance: float,
-    asked_tolerance: float | None, aligner: Align | None, warnings: Reasons,
-) -> tuple[ViewFits | None, Pose, Scan, float, float, float, Reasons]:  # fmt: skip
+@step(
+    gives=("views", "pose", "aligned", "noise", "spacing", "tolerance", "warnings"),
+    reads=("part", "pose", "aligned", "noise", "spacing", "tolerance", "asked_tolerance", "aligner", "warnings"),
+)
+def correct_views(state: JobState) -> tuple[ViewFits | None, Pose, Scan, float, float, float, Reasons]:
     """Compares the views, also those that only the points tell apart, and puts misplaced ones right where the alignment
     fits views: noise, spacing and a tolerance `auto` are then measured again, and that little of the scan lay on the
     part is no doubt any more."""
+    part, pose, aligned, noise, spacing = state.part, state.pose, state.aligned, state.noise, state.spacing
+    tolerance, warnings = state.tolerance, state.warnings
     label, found_by = separate_views(part, aligned, tolerance) or (None, "given")
-    views = fit_views(part, aligned, tolerance, aligner is not None and aligner.moves_views, label, found_by)
+    moves_views = state.aligner is not None and state.aligner.moves_views
+    views = fit_views(part, aligned, tolerance, moves_views, label, found_by)
     if label is not None:
         if views is None or not views.disagree:
             return None, pose, aligned, noise, spacing, tolerance, warnings
@@ -58,7 +60,7 @@ def correct_views(
         warnings = drop_settled(warnings, before, pose)
         noise, spacing = measure_noise_and_spacing(aligned.points)
         aligned = replace(aligned, noise=noise, spacing=spacing)
-        if asked_tolerance is None:
+        if state.asked_tolerance is None:
             tolerance = min(tolerance, choose_tolerance(None, aligned, part)[0])
     return views, pose, aligned, noise, spacing, tolerance, warnings
 
@@ -111,11 +113,12 @@ def _make_rigid(T: Floats) -> Floats:
 
 @step(gives=("fitted", "warnings"))
 def fit_model(
-    part: Part, aligned: Scan, adapted: AdaptedPart | None, deviation: Deviation, surplus: tuple[Surplus, ...],
-    tolerance: float, unit: str, views: ViewFits | None, corrected_scale: float, asked_fit: AskedFit | None,
+    field: ScanField, adapted: AdaptedPart | None, surplus: tuple[Surplus, ...], unit: str, views: ViewFits | None,
+    corrected_scale: float, asked_fit: AskedFit | None,
 ) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
     """Measures how well the part as designed explains the intact skin, and warns where it does not. Surroundings are
     left out: a table ends at the part's lower edges as skin that is bent away does."""
+    part, aligned, tolerance = field.part, field.aligned, field.tolerance
     own = _leave_surroundings_out(aligned, surplus, tolerance)
     if asked_fit is not None and own.all() and (asked_fit.tolerance, asked_fit.noise) == (tolerance, aligned.noise):
         found = asked_fit.fitted  # measured before, with the same part in the same pose
@@ -124,7 +127,7 @@ def fit_model(
             found = replace(found, fit=describe_fit(fit, unit, tolerance))
     else:
         found = measure_fit(
-            part, aligned.points[own], deviation.distance[own], aligned.noise, tolerance, unit, views, corrected_scale
+            part, aligned.points[own], field.distance[own], aligned.noise, tolerance, unit, views, corrected_scale
         )
     found = _tell_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
@@ -157,29 +160,31 @@ def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> Fi
     return replace(fitted, fit=replace(fitted.fit, words=words))
 
 
-@step(gives=("fitted", "warnings"))
+@step(
+    gives=("fitted", "warnings"),
+    reads=("fitted", "surplus", "found", "pose", "field", "adapted", "skin", "unit", "explained", "warnings"),
+)
 def question_fit(
-    fitted: FittedModel | None, surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], pose: Pose, aligned: Scan,
-    part: Part, adapted: AdaptedPart | None, deviation: Deviation, skin: SkinView, unit: str, tolerance: float,
-    explained: Explained, warnings: Reasons,
-) -> tuple[FittedModel | None, Reasons]:  # fmt: skip
+    state: JobState,
+) -> tuple[FittedModel | None, Reasons]:
     """Withdraws the statement that the part as designed explains the intact skin, where there are doubts; limits it to
     what was seen, where that is little."""
+    fitted, warnings, adapted, unit, found = state.fitted, state.warnings, state.adapted, state.unit, state.found
     if fitted is None or fitted.fit.model != "ok":
         return fitted, warnings
-    clusters = {number for item in surplus if item.kind == "displaced piece" for number in item.clusters}
+    field, skin = state.field, state.skin
+    clusters = {number for item in state.surplus if item.kind == "displaced piece" for number in item.clusters}
     displaced = frozenset(site.number for site in found if clusters & set(site.clusters))
     verdicts = {site.number: site.verdict for site in found}
-    doubts = find_fit_doubts(pose, verdicts, surplus, displaced, aligned, deviation, skin)
-    if explained.places:
+    doubts = find_fit_doubts(state.pose, verdicts, state.surplus, displaced, field, skin)
+    if state.explained.places:
         doubts += ("views lie apart",)
     if not doubts:
         seen = float(skin.cells.areas[skin.perhaps_seen].sum() / skin.cells.areas.sum())
-        partly = describe_view_of(fitted.fit, seen, part.diagonal, unit, tolerance)
-        return _tell_adapted(
-            replace(fitted, fit=describe_fit(fitted.fit, unit, tolerance, partly=partly)), adapted
-        ), warnings
-    fit = describe_fit(replace(fitted.fit, model="open"), unit, tolerance, doubts)
+        partly = describe_view_of(fitted.fit, seen, field.part.diagonal, unit, field.tolerance)
+        fit = describe_fit(fitted.fit, unit, field.tolerance, partly=partly)
+        return _tell_adapted(replace(fitted, fit=fit), adapted), warnings
+    fit = describe_fit(replace(fitted.fit, model="open"), unit, field.tolerance, doubts)
     fit = _tell_adapted(replace(fitted, fit=fit), adapted).fit
     # a corrected scale was reported in a note whose text is no longer true
     kept = [note for note in warnings if note.code != "model_fit"]
@@ -187,16 +192,12 @@ def question_fit(
     return replace(fitted, fit=fit), [*kept, Reason("model_fit", fit.words, remedy=remedy)]
 
 
-def measure_at_site(
-    fitted: FittedModel | None, part: Part, aligned: Scan, deviation: Deviation, members: Ints
-) -> float:
+def measure_at_site(fitted: FittedModel | None, field: ScanField, members: Ints) -> float:
     """How far intact skin deviates at the points ``members`` of a site by the model that the fit names; 0 where the
     part is as designed."""
     if fitted is None or fitted.fit.model == "ok" or not len(members):
         return 0.0
-    normals = part.face_normals[deviation.face[members]]
-    places = aligned.points[members] - deviation.distance[members, None] * normals
-    return measure_local(fitted, places, normals)
+    return measure_local(fitted, field.find_feet(members), field.find_normals(members))
 
 
 def measure_local(fitted: FittedModel, places: Floats, normals: Floats) -> float:

@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Part, Pose, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.errors import InputError
 from damageest.geometry.crops import Crop
 from damageest.geometry.distance import signed_distance
@@ -53,19 +53,21 @@ def where_thinned(*route: Contract | AnyStep) -> Branch:
     return Branch("where_thinned", ("scan", "reader"), (route,), run)
 
 
-@step(gives="scan", kept=True)
-def add_points_near_damage(
-    engine: Engine, reader: ReadScan | None, scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str,
-    thermal_scale: float, scan_centre: Floats,
-) -> Scan:  # fmt: skip
+@step(
+    gives="scan",
+    reads=("reader", "scan", "pose", "part", "tolerance", "unit", "thermal_scale", "scan_centre"),
+    kept=True,
+)
+def add_points_near_damage(engine: Engine, state: JobState) -> Scan:
     """Adds all points near damage to the scan. The spacing is then that near damage."""
+    reader, scan, scale = state.reader, state.scan, state.thermal_scale
     assert reader is not None  # as `where_thinned` asks
-    place = _Place(part, pose.T_part_scan, tolerance)
+    place = _Place(state.part, state.pose.T_part_scan, state.tolerance)
     most = max(len(scan.points) // 2, 1_000_000)
 
     def read() -> Iterator[Scan]:
-        pieces = _crop(_read(engine, reader, unit), reader.crop)
-        return pieces if thermal_scale == 1 else (divide_scan(piece, thermal_scale, scan_centre) for piece in pieces)
+        pieces = _crop(_read(engine, reader, state.unit), reader.crop)
+        return pieces if scale == 1 else (divide_scan(piece, scale, state.scan_centre) for piece in pieces)
 
     return _gather(read, place, most, scan)
 

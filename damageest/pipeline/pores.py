@@ -24,7 +24,7 @@ DEEP = 2.0
 
 @step(
     gives=("found", "failures"),
-    reads=("found", "failures", "sites", "aligned", "deviation", "part", "tolerance", "unit"),
+    reads=("found", "failures", "sites", "aligned", "deviation", "part", "tolerance", "unit", "field"),
     calls=(Reconstruct,),
 )
 def add_pores(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures]:
@@ -59,7 +59,7 @@ def _make_pore(engine: Engine, state: JobState, number: int) -> FoundSite | None
     if solid is None:
         return None
     below = -float(signed_distance(solid.vertices, state.part)[0].max())
-    evidence = weigh_evidence(solid, points, state.aligned, state.deviation, state.part, state.tolerance)
+    evidence = weigh_evidence(solid, points, state.field)
     note = (
         f"a closed pore at least {below:.3g} {state.unit} below the skin; it counts as lost, but is in no deposit or "
         "path; mill down to it to fill it"

@@ -114,16 +114,14 @@ ACQUIRE: Route = (
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     check_intact,  # deviation, tolerance, part, segmenter ->
-    inspect_skin,  # part, aligned, deviation, tolerance -> skin, deviation
+    inspect_skin,  # field -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
     check_clusters,  # sites, deviation, tolerance, part ->
-    look_for_sheets,  # part, aligned, deviation, tolerance -> sheets
-    find_surplus,  # calls Cluster, EncloseAll: unit, sheets, aligned, deviation, tolerance, part, sites, samples,
-    #     nearby -> surplus, deviation, +warnings
-    fit_model,  # part, aligned, adapted, deviation, surplus, tolerance, unit, views, corrected_scale, asked_fit
-    #     -> fitted, +warnings
-    set_explained_aside,  # part, aligned, deviation, sites, sheets, views, tolerance, aligner, accept
-    #     -> sites, explained
+    look_for_sheets,  # field -> sheets
+    find_surplus,  # calls Cluster, EncloseAll: unit, sheets, field, aligned, deviation, tolerance, part, sites,
+    #     samples, nearby -> surplus, deviation, +warnings
+    fit_model,  # field, adapted, surplus, unit, views, corrected_scale, asked_fit -> fitted, +warnings
+    set_explained_aside,  # field, sites, sheets, views, aligner, accept -> sites, explained
     gather_intact,  # aligned, deviation, sites -> intact, +warnings
 )
 BY_SITE: Route = (
@@ -138,47 +136,42 @@ BY_SITE: Route = (
     #     -> candidates, +failures
     Repair,  # enclosure, tolerance -> solid
     Boolean,  # solid, part -> damage
-    gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
+    gather_sites,  # candidates, sites, field, unit -> found, +failures, +warnings
 )
 AT_ONCE: Route = (
     where_taken(  # nearby
-        sample_near_damage,  # part, aligned, deviation, sites, tolerance, encloser_at_once -> nearby
+        sample_near_damage,  # field, sites, encloser_at_once -> nearby
         by=(EncloseAll,),
     ),
     EncloseAll,  # part, aligned, deviation, sites, samples, nearby, tolerance -> enclosures
     take_enclosures,  # enclosures, aligned, sites, encloser_at_once -> candidates, +failures
     Boolean,  # solid, part -> damage
-    gather_sites,  # candidates, aligned, deviation, sites, part, tolerance, unit -> found, +failures, +warnings
+    gather_sites,  # candidates, sites, field, unit -> found, +failures, +warnings
 )
 CLOSE: Route = (
     add_lost_bodies,  # part, skin, found -> found
-    add_pores,  # calls Reconstruct: found, failures, sites, aligned, deviation, part, tolerance, unit, spacing, noise
-    #     -> found, failures
+    add_pores,  # calls Reconstruct: found, failures, sites, aligned, deviation, part, tolerance, unit, field, spacing,
+    #     noise -> found, failures
     set_specks_aside,  # failures, sites, aligned, deviation, unit -> failures, +warnings
     number_sites,  # found -> found
-    choose_sites,  # found, choice, aligned, deviation, part, tolerance -> found, +warnings
+    choose_sites,  # found, choice, field -> found, +warnings
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
-    gather_facts,  # skin, part, aligned, deviation, surplus, pose, fitted, tolerance, unit, aligner, sheets, adapted
-    #     -> facts
-    measure_sensor,  # part, aligned, deviation, sites, facts, explained, depth_step, tolerance, pose, aligner
-    #     -> pose_error, sensor
-    weigh_scanner,  # scanner, temperature, corrected_scale, fitted, aligned, pose_error, facts, part, unit
+    gather_facts,  # field, skin, surplus, sheets, pose, aligner, unit, fitted, adapted -> facts
+    measure_sensor,  # field, sites, facts, explained, depth_step, pose, aligner -> pose_error, sensor
+    weigh_scanner,  # scanner, temperature, corrected_scale, fitted, field, pose_error, facts, unit
     #     -> scanner_errors, +warnings
-    measure_uncertainty,  # found, part, aligned, adapted, deviation, skin, coverage, facts, fitted, pose, pose_error,
+    measure_uncertainty,  # found, part, aligned, field, adapted, skin, coverage, facts, fitted, pose, pose_error,
     #     scanner_errors, tolerance, unit, adapter, warnings -> found
-    judge_sites,  # found, accept, rules, facts, part, aligned, deviation, skin, coverage, pose, tolerance, unit,
-    #     views, aligner -> found
-    fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, deviation, tolerance, asked_tolerance,
-    #     unit, part -> found, folded, +warnings
-    question_fit,  # fitted, surplus, found, pose, aligned, part, adapted, deviation, skin, unit, tolerance, explained,
-    #     warnings -> fitted, warnings
+    judge_sites,  # found, accept, rules, facts, field, skin, coverage, pose, unit, views, aligner -> found
+    fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, part, tolerance, asked_tolerance, unit,
+    #     field -> found, folded, +warnings
+    question_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
-    sum_uncertainty,  # found, failures, part, pose, aligned, deviation, tolerance, adapted, folded,
-    #     views, sensor -> volume_95
-    sum_budget,  # found, volume_95, scanner_errors, aligned, part, unit, adapted, folded, views -> budget
+    sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor -> volume_95
+    sum_budget,  # found, volume_95, scanner_errors, field, unit, adapted, folded, views -> budget
     cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
     note_unused,  # samples -> +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,

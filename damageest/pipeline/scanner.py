@@ -11,6 +11,7 @@ from damageest.checks.model_fit import FittedModel
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
 from damageest.checks.site_error import WIDTH
+from damageest.geometry.scan_field import ScanField
 from damageest.job.scanner import Certificate, ScannerInfo, Temperature
 from damageest.pipeline.form import divide_scan
 from damageest.pipeline.state import Reasons
@@ -39,10 +40,10 @@ def correct_temperature(scan: Scan, temperature: Temperature | None) -> tuple[Sc
 @step(gives=("scanner_errors", "warnings"))
 def weigh_scanner(
     scanner: ScannerInfo | None, temperature: Temperature | None, corrected_scale: float, fitted: FittedModel | None,
-    aligned: Scan, pose_error: PoseError, facts: ScanFacts, part: Part, unit: str,
+    field: ScanField, pose_error: PoseError, facts: ScanFacts, unit: str,
 ) -> tuple[ScannerErrors, Reasons]:  # fmt: skip
     """Turns certificate and temperature into errors of the whole scan, and warns where the scan contradicts them."""
-    certificate = (scanner and scanner.certificate) or Certificate()
+    certificate, part, aligned = (scanner and scanner.certificate) or Certificate(), field.part, field.aligned
     terms, unknown = [], []
     if certificate.probing_size is None:
         unknown.append("probing_size")

@@ -6,12 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import DAMAGE, OUTLIER, Deviation, Ints, Part, Pose, Reason, Scan, Sites
+from damageest.artefacts import DAMAGE, OUTLIER, Ints, Pose, Reason, Sites
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.checks.semivariogram import measure_semivariogram
 from damageest.checks.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
 from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
+from damageest.geometry.scan_field import ScanField
 from damageest.job.model import Accept
 from damageest.pipeline.datums import choose_on_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
@@ -38,38 +39,35 @@ UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", 
 
 @step(gives=("pose_error", "sensor"))
 def measure_sensor(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, facts: ScanFacts, explained: Explained,
-    depth_step: float, tolerance: float, pose: Pose, aligner: Align | None,
+    field: ScanField, sites: Sites, facts: ScanFacts, explained: Explained, depth_step: float, pose: Pose,
+    aligner: Align | None,
 ) -> tuple[PoseError, Sensor]:  # fmt: skip
     """Measures noise and systematic errors of the intact skin, and what they hide."""
-    feet = aligned.points - deviation.distance[:, None] * part.face_normals[deviation.face]
-    error = measure_pose_error(
-        part, aligned, deviation, tolerance, spread=pose.spread, held=is_given(aligner),
-        fixing=choose_on_datums(aligner, part, feet, deviation.face),
-    )  # fmt: skip
-    levels = measure_levels(part, aligned, deviation)
-    stray = (deviation.label == OUTLIER) | ((deviation.label == DAMAGE) & (sites.label == 0))
+    fixing = choose_on_datums(aligner, field.part, field.feet, field.deviation.face)
+    error = measure_pose_error(field, spread=pose.spread, held=is_given(aligner), fixing=fixing)
+    stray = (field.label == OUTLIER) | ((field.label == DAMAGE) & (sites.label == 0))
     share = (int(stray.sum()) - explained.points) / max(len(stray), 1)
-    variogram = measure_semivariogram(part, aligned, deviation)
-    sensor = describe_sensor(levels, aligned, error, facts.systematic, depth_step, tolerance, share, variogram)
+    sensor = describe_sensor(
+        measure_levels(field), field.aligned, error, facts.systematic, depth_step, field.tolerance, share,
+        measure_semivariogram(field),
+    )  # fmt: skip
     return error, sensor
 
 
 @step(gives="sheets")
-def look_for_sheets(part: Part, aligned: Scan, deviation: Deviation, tolerance: float) -> Sheets:
+def look_for_sheets(field: ScanField) -> Sheets:
     """Looks for two surfaces over the same skin."""
-    return measure_sheets(aligned, deviation, part, tolerance)
+    return measure_sheets(field)
 
 
 @step(
     gives=("sites", "explained"),
-    reads=("part", "aligned", "deviation", "sites", "sheets", "views", "tolerance", "aligner", "accept"),
+    reads=("field", "sites", "sheets", "views", "aligner", "accept"),
 )
 def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
     """Takes clusters of points that views which lie apart explain for no sites: their verdict would be doubtful,
     whatever their volume is. What is deeper than the views explain stays, and what the job accepts by number."""
-    part, aligned, deviation, sites = state.part, state.aligned, state.deviation, state.sites
-    views, sheets, tolerance = state.views, state.sheets, state.tolerance
+    field, sites, views, sheets = state.field, state.sites, state.views, state.sheets
     is_apart = sheets.share > OF_SCAN or (views is not None and views.disagree)
     if not is_apart or not _is_folding(state.aligner, state.accept):
         return sites, Explained()
@@ -77,20 +75,20 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
     gone = []
     for number in range(1, sites.count + 1):
         members = sites.members(number)
-        depth = -deviation.distance[members]
+        depth = -field.distance[members]
         most = EXPLAINED * apart
         if not len(depth) or np.quantile(depth, DEEPEST) > most or np.count_nonzero(depth > most) >= NEEDED:
             continue
-        own = measure_two_sheets(aligned, deviation, part, members, tolerance)
+        own = measure_two_sheets(field, members)
         if explains(own, float(np.median(depth)), *sheets) or (
-            views is not None and views.find_explained(part, aligned, deviation, members, tolerance) > AGAINST
+            views is not None and views.find_explained(field, members) > AGAINST
         ):
             gone.append(number)
     if not gone:
         return sites, Explained()
     members = np.flatnonzero(np.isin(sites.label, gone))
-    deepest = float(-deviation.distance[members].min())
-    volume = sum(limit_shown(aligned, deviation, sites.members(number)) for number in gone)
+    deepest = float(-field.distance[members].min())
+    volume = sum(limit_shown(field, sites.members(number)) for number in gone)
     new = np.zeros(sites.count + 1, np.int32)
     kept = np.setdiff1d(np.arange(1, sites.count + 1), gone)
     new[kept] = np.arange(1, len(kept) + 1)
@@ -101,8 +99,8 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
 @step(
     gives=("found", "folded", "warnings"),
     reads=(
-        "found", "sensor", "explained", "sheets", "aligner", "accept", "aligned", "deviation", "tolerance",
-        "asked_tolerance", "unit", "part",
+        "found", "sensor", "explained", "sheets", "aligner", "accept", "aligned", "part", "tolerance",
+        "asked_tolerance", "unit", "field",
     ),
 )  # fmt: skip
 def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
@@ -126,17 +124,17 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
     return kept, volume, [Reason("below_noise", text, amount=volume, unit=f"{unit}³", remedy=told[0][1])]
 
 
-def limit_shown(aligned: Scan, deviation: Deviation, members: Ints) -> float:
+def limit_shown(field: ScanField, members: Ints) -> float:
     """How much scan points ``members`` (M,) show at most of a loss: the skin that they cover, and twice as much beside
     it, where it is shallower than the tolerance, times the largest depth."""
-    area = 3 * measure_shown(aligned, len(members))
-    return area * max(float(-deviation.distance[members].min(initial=0.0)), 0.0)
+    area = 3 * measure_shown(field.aligned, len(members))
+    return area * max(float(-field.distance[members].min(initial=0.0)), 0.0)
 
 
 def _limit_explained(state: JobState, site: FoundSite, cause: str) -> float:
     """How much a site that is none holds at most. The volume of a few stray points is what bulges between them."""
     most = limit_doubtful(site)
-    return min(most, limit_shown(state.aligned, state.deviation, site.members)) if cause == "stray" else most
+    return min(most, limit_shown(state.field, site.members)) if cause == "stray" else most
 
 
 def is_given(aligner: Align | None) -> bool:

@@ -6,10 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Enclosures, Floats, Ints, Part, Reason, Scan, Sites
+from damageest.artefacts import Deviation, Enclosures, Floats, Ints, Reason, Scan, Sites
 from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
+from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
 from damageest.pipeline.stage_errors import describe_points
 from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState, Reasons
@@ -65,14 +66,13 @@ def take_enclosures(
 
 @step(gives=("found", "failures", "warnings"))
 def gather_sites(
-    candidates: tuple[Candidate, ...], aligned: Scan, deviation: Deviation, sites: Sites, part: Part, tolerance: float,
-    unit: str,
-) -> tuple[tuple[FoundSite, ...], Failures, Reasons]:  # fmt: skip
+    candidates: tuple[Candidate, ...], sites: Sites, field: ScanField, unit: str
+) -> tuple[tuple[FoundSite, ...], Failures, Reasons]:
     """Turns damage volumes into sites, each compared with the scan. Clusters left without a volume are failures."""
     if not candidates:
         return (), (), ()
-    method = candidates[0].method
-    reach = max(2 * tolerance, aligned.spacing)
+    method, aligned = candidates[0].method, field.aligned
+    reach = max(2 * field.tolerance, aligned.spacing)
     pieces, dropped = [], 0.0
     for candidate in candidates:
         if candidate.damage is not None:
@@ -83,7 +83,7 @@ def gather_sites(
     out = []
     for item in join_pieces(pieces):
         members = np.flatnonzero(np.isin(sites.label, item.clusters))
-        evidence = weigh_evidence(item.damage, aligned.points[members], aligned, deviation, part, tolerance)
+        evidence = weigh_evidence(item.damage, aligned.points[members], field)
         sources = [candidate for candidate in candidates if set(candidate.clusters) & set(item.clusters)]
         notes = [note for candidate in sources for note in candidate.notes]
         site = FoundSite(

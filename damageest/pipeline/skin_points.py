@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Part, Samples, Scan, Sites
+from damageest.artefacts import ADDED, INTACT, Samples, Sites
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin_near import NearCubes, find_cubes_near, sample_near
 from damageest.pipeline.engine import Branch, Engine, follow
 from damageest.pipeline.state import JobState, Reasons
@@ -49,15 +50,14 @@ def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
 
 
 @step(gives="nearby")
-def sample_near_damage(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float, encloser_at_once: EncloseAll | None
-) -> Samples:
+def sample_near_damage(field: ScanField, sites: Sites, encloser_at_once: EncloseAll | None) -> Samples:
     """Points on the part's skin near the damage: a tolerance apart about the rim and where the scan shows no skin, two
     elsewhere."""
-    on_skin = (deviation.label == INTACT) | (deviation.label == ADDED)
+    part, aligned, tolerance = field.part, field.aligned, field.tolerance
+    on_skin = (field.label == INTACT) | (field.label == ADDED)
     damaged = np.flatnonzero(sites.label > 0)
     places, intact = aligned.points[damaged], aligned.points[on_skin]
-    feet = places - deviation.distance[damaged, None] * part.face_normals[deviation.face[damaged]]
+    feet = field.find_feet(damaged)
     reach = encloser_at_once.nearby_reach if encloser_at_once else MOST_EDGE
     edge = max(reach * tolerance, min(EDGE_SPACINGS * aligned.spacing, MOST_EDGE * tolerance))
     near, unseen = find_cubes_near(part, places, feet, intact, edge)

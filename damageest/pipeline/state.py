@@ -46,6 +46,7 @@ from damageest.checks.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.geometry.lost_depth import measure_lost_depth
+from damageest.geometry.scan_field import ScanField
 from damageest.job.model import Accept, SiteChoice
 from damageest.job.scanner import ScannerInfo, Temperature
 from damageest.job.sections import SectionChoice
@@ -59,6 +60,9 @@ from damageest.stages.export import ExportedFiles, PathWriter, Writer
 from damageest.stages.report import ReportFiles
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
+
+MADE_OF = {"field": ("part", "aligned", "deviation", "tolerance")}
+"""Values that nothing gives: they are made of others, and as new as these."""
 
 T = TypeVar("T")
 Failures = Sequence[StageError]
@@ -84,6 +88,11 @@ class Value(Generic[T]):
     def __get__(self, state: State, owner: type) -> T: ...
     def __get__(self, state: State | None, owner: type) -> Any:
         return self if state is None else state.get(self.name)
+
+
+def list_given(names: Iterable[str]) -> list[str]:
+    """The names of values that are given, for those that are made of them too; each once, in their order."""
+    return list(dict.fromkeys(given for name in names for given in MADE_OF.get(name, (name,))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,7 +122,7 @@ class State:
 
     def select(self, names: Iterable[str]) -> Self:
         """The state with the values of these names alone."""
-        chosen = list(names)
+        chosen = list_given(names)
         return replace(
             self, values={name: self.get(name) for name in chosen}, keys={name: self.key(name) for name in chosen}
         )
@@ -212,9 +221,13 @@ class JobState(State):
     sites. ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written
     into, ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
     ``thermal_scale``: what the scan was divided by for the part's temperature, about ``scan_centre`` (3,).
+    ``field``: part, aligned scan, deviation and tolerance as one value, which no step gives: it is that of the state.
     ``scanner_errors``: of the whole scan by certificate and temperature; ``budget``: of the total volume. ``sheets``:
     two surfaces over the same skin; ``explained``: places that views which lie apart explain, no sites.
     """
+
+    made: dict[str, ScanField] = field(default_factory=dict, repr=False)
+    """The last field by its key, shared by all states of a run: what it computes is computed once."""
 
     name = Value[str]()
     unit = Value[str]()
@@ -249,6 +262,7 @@ class JobState(State):
     adapted = Value[AdaptedPart | None]()
     asked_fit = Value[AskedFit | None]()
     deviation = Value[Deviation]()
+    field = Value[ScanField]()
     sites = Value[Sites]()
     intact = Value[Floats]()
     skin = Value[SkinView]()
@@ -287,3 +301,16 @@ class JobState(State):
 
     number = 0
     """That of a site is 1 or more."""
+
+    def get(self, name: str) -> Any:
+        return self._make_field() if name == "field" else super().get(name)
+
+    def key(self, name: str) -> str:
+        return digest([self.key(one) for one in MADE_OF[name]]) if name in MADE_OF else super().key(name)
+
+    def _make_field(self) -> ScanField:
+        key = self.key("field")
+        if key not in self.made:
+            self.made.clear()
+            self.made[key] = ScanField(self.part, self.aligned, self.deviation, self.tolerance)
+        return self.made[key]

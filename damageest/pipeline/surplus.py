@@ -42,7 +42,7 @@ EQUAL, EQUAL_TOUCHING = 1.35, 1.1
 the loss, and may be a weld bead on it."""
 
 
-@step(gives=("surplus", "deviation", "warnings"), reads=("unit", "sheets"), calls=(Cluster, EncloseAll))
+@step(gives=("surplus", "deviation", "warnings"), reads=("unit", "sheets", "field"), calls=(Cluster, EncloseAll))
 def find_surplus(engine: Engine, state: JobState) -> tuple[tuple[Surplus, ...], Deviation, Reasons]:
     """Finds added metal and surroundings, and the volume of the former.
 
@@ -59,7 +59,7 @@ def find_surplus(engine: Engine, state: JobState) -> tuple[tuple[Surplus, ...], 
     except StageError as error:
         warning = Reason("surplus", f"points outside the nominal surface could not be grouped: {error}")
         return (), state.deviation, [warning]
-    found = describe_surplus(clusters, state.sites, state.aligned, state.deviation, state.part, state.tolerance)
+    found = describe_surplus(clusters, state.sites, state.field)
     kept = _keep_metal(clusters, found)
     deviation = label_strays(state.deviation, ADDED, kept)
     surplus = _close(own, turned, found, kept, _choose_layer(state, found)) if kept.count else found
@@ -203,7 +203,7 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
         state = state.with_value(JobState.samples, complement_samples(turned.samples))
     encloser = engine.job.stages[EncloseAll]
     assert isinstance(encloser, EncloseAll)  # as it is called below
-    nearby = sample_near_damage(part, turned.aligned, deviation, kept, turned.tolerance, encloser)
+    nearby = sample_near_damage(replace(turned.field, deviation=deviation), kept, encloser)
     state = state.with_value(JobState.nearby, complement_samples(nearby))
     origin = part.bounds.mean(axis=0)
     whole = to_manifold(part, origin)

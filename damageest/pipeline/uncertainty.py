@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import INTACT, AdaptedPart, Deviation, Flags, Ints, Part, Pose, Scan, Solid
+from damageest.artefacts import INTACT, AdaptedPart, Flags, Ints, Pose, Solid
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.budget import make_depth_budget, make_volume_budget
 from damageest.checks.coverage import find_removed_cells
@@ -21,10 +21,11 @@ from damageest.checks.scan_quality import describe_few
 from damageest.checks.scanner import ScannerErrors
 from damageest.checks.shallow_loss import limit_shallow_loss
 from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, measure_certain, sum_free
-from damageest.checks.uncertainty import limit_beside, measure_shifts, measure_site_error
+from damageest.checks.uncertainty import Loss, ScanErrors, limit_beside, measure_shifts, measure_site_error
 from damageest.checks.view_fit import ViewFits
 from damageest.checks.view_overlap import compare_at_site
 from damageest.findings import Budget, Fading, Interval, Sensor, Uncertainty
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
@@ -48,8 +49,8 @@ BESIDE = 2.0
         "found",
         "part",
         "aligned",
+        "field",
         "adapted",
-        "deviation",
         "skin",
         "coverage",
         "facts",
@@ -74,8 +75,8 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
 
 @step(gives="volume_95")
 def sum_uncertainty(
-    found: tuple[FoundSite, ...], failures: Failures, part: Part, pose: Pose, aligned: Scan, deviation: Deviation,
-    tolerance: float, adapted: AdaptedPart | None, folded: float, views: ViewFits | None, sensor: Sensor,
+    found: tuple[FoundSite, ...], failures: Failures, pose: Pose, field: ScanField, adapted: AdaptedPart | None,
+    folded: float, views: ViewFits | None, sensor: Sensor,
 ) -> Interval | None:  # fmt: skip
     """Gives the job the 95 % interval of its total volume.
 
@@ -87,11 +88,11 @@ def sum_uncertainty(
     """
     hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
     if not found:
-        is_unknown = failures or pose.doubts or _may_hide_loss(part, aligned, deviation, tolerance)
+        is_unknown = failures or pose.doubts or _may_hide_loss(field)
         if is_unknown:
             return None
-        shallow = limit_shallow_loss(part, aligned, deviation, tolerance, sensor.least_width)
-        return 0.0, measure_hidden_wear(part, pose) + hidden + shallow
+        shallow = limit_shallow_loss(field, sensor.least_width)
+        return 0.0, measure_hidden_wear(field.part, pose) + hidden + shallow
     lost = [error for error in failures if error.stage != Allowance.stage]
     taken = [site for site in found if site.accepted]
     errors = [site.error for site in taken if site.error is not None]
@@ -106,7 +107,7 @@ def sum_uncertainty(
 
 @step(gives="budget")
 def sum_budget(
-    found: tuple[FoundSite, ...], volume_95: Interval | None, scanner_errors: ScannerErrors, aligned: Scan, part: Part,
+    found: tuple[FoundSite, ...], volume_95: Interval | None, scanner_errors: ScannerErrors, field: ScanField,
     unit: str, adapted: AdaptedPart | None, folded: float, views: ViewFits | None,
 ) -> Budget | None:  # fmt: skip
     """Makes the budget of the total volume; None where that has no interval, or there is no site."""
@@ -115,7 +116,7 @@ def sum_budget(
         return None
     hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
     return make_volume_budget(
-        errors, scanner_errors, aligned.noise, part.tessellation_error, unit,
+        errors, scanner_errors, field.aligned.noise, field.part.tessellation_error, unit,
         doubtful=hidden + _sum_doubtful(found), free=sum_free(errors),
     )  # fmt: skip
 
@@ -146,21 +147,22 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         state.tolerance, state.unit,
     )  # fmt: skip
     site = replace(site, beyond=beyond)
-    differ = WIDTH * compare_at_site(state.part, state.aligned, state.deviation, site.members, state.skin.cells.edge)
+    differ = WIDTH * compare_at_site(state.field, site.members, state.skin.cells.edge)
     facts = replace(state.facts, between_views=max(state.facts.between_views, differ))
     # what the model fit gives is the 95 % bound of a deviation
-    found = measure_site_error(
-        site.damage, inner, state.part, state.aligned, points, site.evidence, pose, facts, beyond,
-        free=state.pose.free, adapted=state.adapted, scanner=state.scanner_errors,
-        form=_measure_form(state, site),
-    )  # fmt: skip
+    loss, errors = (
+        Loss(site.damage, inner, points, site.evidence, beyond),
+        ScanErrors(pose, facts, state.scanner_errors),
+    )
+    form = _measure_form(state, site)
+    found = measure_site_error(loss, state.part, state.aligned, errors, form, state.pose.free, state.adapted)
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
     fading = _measure_fading(state, site, inner, taken, pose)
     dependences = measure_dependence(site.damage, state.part, state.pose)
     extrapolated, extrapolated_error = _measure_extrapolated(state, site.damage, inner)
-    bent_wall = find_bent_wall(site.damage, state.part, state.skin, state.aligned, state.deviation, site.members)
+    bent_wall = find_bent_wall(site.damage, state.skin, state.field, site.members)
     error = replace(
         found,
         less=found.less + (site.damage.volume if bent_wall else 0.0),
@@ -207,7 +209,7 @@ def _measure_pore(state: JobState, site: FoundSite) -> FoundSite:
     surface = measure_inner_surface(site.damage, all_inner, points, noise, state.aligned.spacing, state.tolerance)
     if surface is None:
         return replace(site, uncertainty=Uncertainty(None, None))
-    deepest = float(-state.deviation.distance[site.members].min())
+    deepest = float(-state.field.distance[site.members].min())
     error = SiteError(
         site.damage.volume, surface.noise, ROUGH * surface.gap * site.damage.area, 0.0, 0.0,
         depth=deepest, depth_error=float(np.hypot(surface.gap / 2, noise)), depth_by={"spacing": surface.gap / 2},
@@ -228,15 +230,16 @@ def _measure_form(state: JobState, site: FoundSite) -> float:
     was_asked = state.adapter is not None and state.adapter.deforms and state.adapted is None
     if was_asked and not any(note.code == Adapt.stage for note in state.warnings):
         return 0.0
-    return measure_at_site(state.fitted, state.part, state.aligned, state.deviation, site.members) / WIDTH
+    return measure_at_site(state.fitted, state.field, site.members) / WIDTH
 
 
-def _may_hide_loss(part: Part, scan: Scan, deviation: Deviation, tolerance: float) -> bool:
+def _may_hide_loss(field: ScanField) -> bool:
     """Whether there are too few points to say that nothing is lost: so few or so far apart that they do not show the
     part, or far apart for the tolerance with points too deep for noise, which are in no site."""
-    if describe_few(scan) or scan.spacing > COARSE * part.diagonal:
+    scan, tolerance = field.aligned, field.tolerance
+    if describe_few(scan) or scan.spacing > COARSE * field.part.diagonal:
         return True
-    return scan.spacing > tolerance and bool((deviation.distance < -2 * tolerance).any())
+    return scan.spacing > tolerance and bool((field.distance < -2 * tolerance).any())
 
 
 def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> tuple[float, float]:
@@ -247,7 +250,7 @@ def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> tuple
         return 0.0, 0.0
     from scipy.spatial import cKDTree
 
-    intact = state.aligned.points[state.deviation.label == INTACT]
+    intact = state.aligned.points[state.field.label == INTACT]
     places, normals = damage.triangles[~inner].mean(axis=1), damage.face_normals[~inner]
     far = float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
     moved = measure_shifts(adapted.part, adapted.modes, places, normals)

@@ -7,20 +7,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Deviation, Part, Pose, Reason, Scan
+from damageest.artefacts import Reason
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.elsewhere import measure_elsewhere
 from damageest.checks.evidence import weigh_evidence
 from damageest.checks.free_pose import compare_other_poses, describe_motion
-from damageest.checks.model_fit import FittedModel
 from damageest.checks.one_motion import are_sound, is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
-from damageest.checks.two_sheets import Sheets, measure_two_sheets
+from damageest.checks.two_sheets import measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
 from damageest.checks.verdict import ask_rules, decide, open_end
 from damageest.checks.visibility import measure_visibility
 from damageest.errors import StageError
-from damageest.findings import Level, Surplus
+from damageest.findings import Level
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_solid, unite
 from damageest.geometry.voxels import measure_area
 from damageest.job.model import Accept, SiteChoice
@@ -30,17 +30,16 @@ from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import FreePose, ScanFacts, SiteFacts
 from damageest.rules.scattered import ALIKE, SHALLOW
-from damageest.stages.align import Align
 
 BY_RAYS = 0.5
 """Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
-JUDGED_BY = ("part", "aligned", "deviation", "skin", "coverage", "pose", "tolerance", "unit", "views", "aligner")
+JUDGED_BY = ("field", "skin", "coverage", "pose", "unit", "views", "aligner")
 """What the facts of a site are gathered from."""
 
 
 @step(gives=("found", "warnings"))
 def choose_sites(
-    found: tuple[FoundSite, ...], choice: SiteChoice, aligned: Scan, deviation: Deviation, part: Part, tolerance: float
+    found: tuple[FoundSite, ...], choice: SiteChoice, field: ScanField
 ) -> tuple[tuple[FoundSite, ...], Reasons]:
     """Drops and merges sites as the job says. Numbers stay those of a run without these decisions."""
     _check_numbers("sites.drop", choice.drop, found)
@@ -51,7 +50,7 @@ def choose_sites(
     for group in choice.merge:
         members = [sites.pop(number) for number in sorted(set(group)) if number in sites]
         if members:
-            sites[members[0].number] = _merge(members, aligned, deviation, part, tolerance)
+            sites[members[0].number] = _merge(members, field)
             named = ", ".join(str(one.number) for one in members)
             warnings.append(Reason("sites_merged", f"sites {named} were merged, as the job says"))
     if choice.keep is not None:
@@ -65,18 +64,17 @@ def choose_sites(
     return tuple(sites[number] for number in sorted(sites)), warnings
 
 
-@step(gives="facts")
-def gather_facts(
-    skin: SkinView, part: Part, aligned: Scan, deviation: Deviation, surplus: tuple[Surplus, ...], pose: Pose,
-    fitted: FittedModel | None, tolerance: float, unit: str, aligner: Align | None, sheets: Sheets,
-    adapted: AdaptedPart | None,
-) -> ScanFacts:  # fmt: skip
+@step(
+    gives="facts", reads=("field", "skin", "surplus", "sheets", "pose", "aligner", "unit", "fitted", "adapted")
+)  # fmt: skip
+def gather_facts(state: JobState) -> ScanFacts:
     """Measures what the whole scan says about skin that deviates and is not damaged."""
-    return gather_scan_facts(
-        skin, part, aligned, deviation, surplus, pose, None if fitted is None else fitted.fit, tolerance, unit,
-        is_fitted=aligner is not None and aligner.gives_fitted_pose and not pose.is_held, sheets=sheets,
-        adapted=0.0 if adapted is None else adapted.amount,
-    )  # fmt: skip
+    aligner, pose = state.aligner, state.pose
+    is_fitted = aligner is not None and aligner.gives_fitted_pose and not pose.is_held
+    facts = gather_scan_facts(state.field, state.skin, state.surplus, state.sheets, pose, is_fitted, state.unit)
+    fitted, adapted = state.fitted, state.adapted
+    fit = None if fitted is None else fitted.fit
+    return replace(facts, fit=fit, adapted=0.0 if adapted is None else adapted.amount)
 
 
 @step(gives="found", reads=("found", "accept", "rules", "facts", *JUDGED_BY))
@@ -113,7 +111,7 @@ def _gather_all_facts(state: JobState) -> list[SiteFacts]:
     held = bool(state.found) and _is_held_by_datums(state)
     each = [_gather_site_facts(state, site, held) for site in state.found]
     shifted = max((one.typical for one in each if one.one_motion), default=0.0)
-    waves = [one.volume for one in each if one.count and one.deepest < SHALLOW * state.tolerance]
+    waves = [one.volume for one in each if one.count and one.deepest < SHALLOW * state.field.tolerance]
     return [replace(one, shifted=shifted, shallow=sum(v >= ALIKE * one.volume for v in waves)) for one in each]
 
 
@@ -121,23 +119,21 @@ def _is_held_by_datums(state: JobState) -> bool:
     """Whether datums that are sound hold the pose."""
     if not has_datums(state.aligner):
         return False
-    face, distance = state.deviation.face, state.deviation.distance
-    feet = state.aligned.points - distance[:, None] * state.part.face_normals[face]
-    on = choose_on_datums(state.aligner, state.part, feet, face)
-    return on is not None and are_sound(distance, on, state.tolerance)
+    field = state.field
+    on = choose_on_datums(state.aligner, field.part, field.feet, field.deviation.face)
+    return on is not None and are_sound(field.distance, on, field.tolerance)
 
 
 def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFacts:
     """``held``: whether datums that are sound hold the pose: then one motion of all other skin is what it has lost."""
     # from the nearest skin, whichever: what moved by an error of pose or views is moved from there
-    depth, points = -state.deviation.distance[site.members], state.aligned.points
+    field, members = state.field, site.members
+    depth, points = -field.distance[members], field.points
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
-    visible = measure_visibility(
-        site.damage, state.part, state.aligned, state.deviation, points[site.members], state.tolerance
-    )
+    visible = measure_visibility(site.damage, field, points[members])
     return SiteFacts(
         volume=site.damage.volume,
-        area=measure_area(points[site.members], state.skin.cells.edge) if len(depth) else 0.0,
+        area=measure_area(points[members], state.skin.cells.edge) if len(depth) else 0.0,
         damage_area=site.damage.area,
         count=len(depth),
         typical=typical,
@@ -147,28 +143,15 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         uncertainty=site.uncertainty,
         by_rays=_is_proven_by_rays(state.skin, site),
         rim_unseen=measure_unseen_rim(
-            site.damage, state.part, state.coverage, 2 * max(state.tolerance, state.aligned.spacing)
+            site.damage, field.part, state.coverage, 2 * max(field.tolerance, field.aligned.spacing)
         ),
-        two_sheets=measure_two_sheets(
-            state.aligned, state.deviation, state.part, site.members, state.tolerance, site.damage
-        ),
-        misplaced=0.0
-        if state.views is None
-        else state.views.find_explained(state.part, state.aligned, state.deviation, site.members, state.tolerance),
-        one_motion=not held
-        and is_one_motion(state.aligned, state.deviation, state.part, site.members, state.tolerance),
-        elsewhere=measure_elsewhere(
-            state.part,
-            state.aligned,
-            state.deviation,
-            site.members,
-            state.skin,
-            find_removed_cells(site.damage, state.skin),
-            state.tolerance,
-        )
+        two_sheets=measure_two_sheets(field, members, site.damage),
+        misplaced=0.0 if state.views is None else state.views.find_explained(field, members),
+        one_motion=not held and is_one_motion(field, members),
+        elsewhere=measure_elsewhere(field, members, state.skin, find_removed_cells(site.damage, state.skin))
         if state.facts.is_fitted
         else 0.0,
-        other_poses=compare_other_poses(site.damage, state.part, state.pose, state.tolerance),
+        other_poses=compare_other_poses(site.damage, field.part, state.pose, field.tolerance),
         free=tuple(
             FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
             for one in site.dependences
@@ -192,12 +175,12 @@ def _check_numbers(field: str, numbers: Iterable[int], sites: tuple[FoundSite, .
         raise StageError(f"{field} names site {unknown[0]}; {there}", f"change {field} in the job")
 
 
-def _merge(members: list[FoundSite], aligned: Scan, deviation: Deviation, part: Part, tolerance: float) -> FoundSite:
+def _merge(members: list[FoundSite], field: ScanField) -> FoundSite:
     first = members[0]
     origin = first.damage.bounds.mean(axis=0)
     damage = to_solid(unite((site.damage for site in members), origin), origin) or first.damage
     points = np.unique(np.concatenate([site.members for site in members]))
-    evidence = weigh_evidence(damage, aligned.points[points], aligned, deviation, part, tolerance)
+    evidence = weigh_evidence(damage, field.points[points], field)
     whole = replace(
         first,
         clusters=tuple(sorted({cluster for site in members for cluster in site.clusters})),

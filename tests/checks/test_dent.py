@@ -11,6 +11,7 @@ from damageest.checks.coverage import SkinView
 from damageest.checks.dent import find_bent_wall
 from damageest.checks.skin_cells import cut_skin, find_seen
 from damageest.geometry.distance import closest_on_mesh, signed_distance
+from damageest.geometry.scan_field import ScanField
 from tests.stages.enclose.test_side import RADIUS, TOLERANCE, plate, scan_top
 
 SPACING = 0.8
@@ -29,12 +30,13 @@ def ask(wall: float, points: Floats) -> float:
     label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
     deviation = Deviation(distance, closest_on_mesh(points, part).face, label)
     scan = Scan(points, noise=0.02, spacing=SPACING)
+    field = ScanField(part, scan, deviation, TOLERANCE)
     cells = cut_skin(part, SPACING)
-    skin = SkinView(cells, *find_seen(cells, part, scan, deviation, TOLERANCE), None)
+    skin = SkinView(cells, *find_seen(cells, field), None)
     lost = trimesh.creation.cylinder(RADIUS, 1.0, sections=64)
     lost.apply_translation([0, 0, -0.5])
     members = np.flatnonzero(label == DAMAGE)
-    return find_bent_wall(Solid(lost.vertices, lost.faces), part, skin, scan, deviation, members)
+    return find_bent_wall(Solid(lost.vertices, lost.faces), skin, field, members)
 
 
 @pytest.mark.parametrize("deep", [0.6, 0.9])

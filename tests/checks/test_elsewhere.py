@@ -8,6 +8,7 @@ import pytest
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan
 from damageest.checks.elsewhere import measure_elsewhere
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.coverage import inspect_skin
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import SIZE, box
@@ -26,11 +27,12 @@ def measure(sound: float) -> float:
     label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
     deviation = Deviation(distance, face, label)
     scan = Scan(points, noise=0.03, spacing=0.6)
-    skin, _ = inspect_skin.function(part, scan, deviation, TOLERANCE)
+    field = ScanField(part, scan, deviation, TOLERANCE)
+    skin, _ = inspect_skin(field)
     cells = skin.cells
     removed = (cells.normals[:, 2] > 0.9) & (np.abs(cells.centres[:, 0]) < (1 - sound) * X)
     members = np.flatnonzero(label == DAMAGE)
-    return measure_elsewhere(part, scan, deviation, members, skin, removed, TOLERANCE)
+    return measure_elsewhere(field, members, skin, removed)
 
 
 def test_wear_of_a_whole_face_may_be_that_of_the_other() -> None:

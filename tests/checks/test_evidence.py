@@ -12,12 +12,13 @@ from manifold3d import Manifold
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Evidence, Part, Scan, Solid
 from damageest.checks.evidence import weigh_evidence
 from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import iou, to_manifold, to_solid
 from tests.scenes import TOOLS, Scene, scene
 
 
 def evidence(case: Scene, damage: Solid) -> Evidence:
-    return weigh_evidence(damage, case.of_sites(), case.aligned, case.deviation, case.part, case.tolerance)
+    return weigh_evidence(damage, case.of_sites(), case.field)
 
 
 def middle(body: Manifold) -> list[float]:
@@ -85,6 +86,7 @@ def test_the_other_side_of_a_thin_wall_is_not_beside_a_pit(least_x: float, is_se
     deviation = Deviation(points[:, 2].copy(), np.zeros(len(points), int), np.where(in_pit, DAMAGE, INTACT))
     plate = Part(part.vertices, part.faces)
     deviation = replace(deviation, face=closest_on_mesh(points * [1, 1, 0], plate).face)
-    found = weigh_evidence(damage, points[in_pit], Scan(points, noise=0.01, spacing=0.5), deviation, plate, 0.15)
+    field = ScanField(plate, Scan(points, noise=0.01, spacing=0.5), deviation, 0.15)
+    found = weigh_evidence(damage, points[in_pit], field)
     assert (found.skin_unseen < 0.02) == is_seen
     assert (found.skin_unseen > 0.25) != is_seen

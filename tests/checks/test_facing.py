@@ -11,6 +11,7 @@ from manifold3d import Manifold
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Flags, Floats, Part, Scan
 from damageest.checks.facing import find_turned
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_arrays
 
 TOLERANCE = 0.5
@@ -36,7 +37,7 @@ def find(nominal: Any, damaged: Any, spacing: float, noise: float) -> tuple[Flag
     distance, face = signed_distance(points, part)
     label = np.where(np.abs(distance) < TOLERANCE, INTACT, DAMAGE).astype(np.uint8)
     scan = Scan(points, noise=noise, spacing=spacing)
-    return find_turned(scan, part, Deviation(distance, face, label), TOLERANCE), places
+    return find_turned(ScanField(part, scan, Deviation(distance, face, label), TOLERANCE)), places
 
 
 @pytest.mark.variants(1)

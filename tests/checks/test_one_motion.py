@@ -9,6 +9,7 @@ import trimesh
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.one_motion import are_sound, is_one_motion
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import SIZE, box
 
@@ -26,7 +27,7 @@ def ask(points: Floats) -> bool:
     label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
     scan = Scan(points, noise=NOISE, spacing=0.6)
     members = np.flatnonzero(label == DAMAGE)
-    return is_one_motion(scan, Deviation(distance, face, label), box(), members, TOLERANCE)
+    return is_one_motion(ScanField(box(), scan, Deviation(distance, face, label), TOLERANCE), members)
 
 
 @pytest.mark.parametrize("shift", [1.5, 3.0])
@@ -61,7 +62,7 @@ def test_a_journal_that_is_worn_on_one_side_is_no_motion() -> None:
     distance, face = signed_distance(points, part)
     label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
     scan, members = Scan(points, noise=NOISE, spacing=0.6), np.flatnonzero(label == DAMAGE)
-    assert not is_one_motion(scan, Deviation(distance, face, label), part, members, TOLERANCE)
+    assert not is_one_motion(ScanField(part, scan, Deviation(distance, face, label), TOLERANCE), members)
 
 
 def test_wear_of_all_faces_is_no_motion() -> None:

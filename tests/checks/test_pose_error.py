@@ -9,6 +9,7 @@ import trimesh
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
 from damageest.checks.pose_error import PoseError, measure_pose_error
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_manifold, to_solid
 from tests import damaged_box
@@ -29,7 +30,8 @@ def measure(
     points = points + shift + np.random.default_rng(1).normal(scale=noise, size=points.shape)
     distance, face = signed_distance(points, part)
     deviation = Deviation(distance, face, np.full(count, INTACT, np.uint8))
-    return measure_pose_error(part, Scan(points, noise=SIGMA, spacing=0.5), deviation, TOLERANCE, **more)  # type: ignore[arg-type]
+    scan = Scan(points, noise=SIGMA, spacing=0.5)
+    return measure_pose_error(ScanField(part, scan, deviation, TOLERANCE), **more)  # type: ignore[arg-type]
 
 
 def shift_errors(error: PoseError) -> Floats:
@@ -92,7 +94,7 @@ def measure_wavy(part: Part, length: float) -> PoseError:
     points = points + wave * mesh.face_normals[index] + np.random.default_rng(0).normal(scale=SIGMA, size=points.shape)
     distance, face = signed_distance(points, part)
     deviation = Deviation(distance, face, np.zeros(len(points), np.uint8))
-    return measure_pose_error(part, Scan(points, noise=SIGMA, spacing=0.5), deviation, TOLERANCE)
+    return measure_pose_error(ScanField(part, Scan(points, noise=SIGMA, spacing=0.5), deviation, TOLERANCE))
 
 
 def test_too_few_points_leave_a_tolerance_to_every_direction() -> None:

@@ -8,6 +8,7 @@ from damageest.artefacts import Floats, Scan
 from damageest.checks.surplus import describe_surplus
 from damageest.findings import Surplus
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples
+from damageest.geometry.scan_field import ScanField
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.sample.edge_aware import EdgeAware
 from damageest.stages.segment.mesh_distance import MeshDistance
@@ -20,7 +21,7 @@ def describe(points: Floats) -> tuple[Surplus, ...]:
     losses = Dbscan().run(aligned=aligned, deviation=deviation, tolerance=TOLERANCE)
     turned = complement_deviation(deviation)
     clusters = Dbscan().run(aligned=aligned, deviation=turned, tolerance=TOLERANCE)
-    return describe_surplus(clusters, losses, aligned, deviation, part(), TOLERANCE)
+    return describe_surplus(clusters, losses, ScanField(part(), aligned, deviation, TOLERANCE))
 
 
 def test_beads_are_surplus_with_height_and_area() -> None:

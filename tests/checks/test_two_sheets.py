@@ -9,6 +9,7 @@ import damageest
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Scan
 from damageest.checks.two_sheets import measure_sheets, measure_two_sheets
 from damageest.geometry.distance import signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.rules.two_sheets import AGAINST, OF_SCAN
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import SIZE, box
@@ -29,19 +30,20 @@ def lower_top(points: Floats, depth: float, where: Floats) -> Floats:
     return out
 
 
-def compare(points: Floats) -> tuple[Scan, Deviation]:
+def compare(points: Floats) -> ScanField:
     distance, face = signed_distance(points, box())
     label = np.where(distance < -TOLERANCE, DAMAGE, INTACT).astype(np.uint8)
-    return Scan(points, noise=NOISE, spacing=0.6), Deviation(distance, face, label)
+    scan = Scan(points, noise=NOISE, spacing=0.6)
+    return ScanField(box(), scan, Deviation(distance, face, label), TOLERANCE)
 
 
 def measure(points: Floats) -> float:
-    scan, deviation = compare(points)
-    return measure_two_sheets(scan, deviation, box(), np.flatnonzero(deviation.label == DAMAGE), TOLERANCE)
+    field = compare(points)
+    return measure_two_sheets(field, np.flatnonzero(field.label == DAMAGE))
 
 
 def measure_scan(points: Floats) -> float:
-    return measure_sheets(*compare(points), box(), TOLERANCE).share
+    return measure_sheets(compare(points)).share
 
 
 @pytest.mark.parametrize("depth", [1.5, 2.0, 4.0])

@@ -9,6 +9,7 @@ import trimesh
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan, Solid
 from damageest.checks.visibility import Visibility, measure_visibility
 from damageest.geometry.distance import closest_on_mesh, signed_distance
+from damageest.geometry.scan_field import ScanField
 from tests.stages.enclose.test_side import RADIUS, TOLERANCE, plate, scan_top
 
 
@@ -28,7 +29,8 @@ def ask(wall: float, deep: float, wrong: bool, rim: bool = True) -> Visibility:
         label[:] = DAMAGE
     deviation = Deviation(distance, closest_on_mesh(points, part).face, label)
     scan = Scan(points, noise=0.02, spacing=0.8)
-    return measure_visibility(Solid(lost.vertices, lost.faces), part, scan, deviation, members, TOLERANCE)
+    field = ScanField(part, scan, deviation, TOLERANCE)
+    return measure_visibility(Solid(lost.vertices, lost.faces), field, members)
 
 
 @pytest.mark.parametrize(("wall", "deep"), [(3.0, 1.2), (3.0, 2.4), (2.0, 0.8), (30.0, 1.2)])
@@ -56,7 +58,8 @@ def test_a_hollow_inside_the_metal_is_seen_from_nowhere() -> None:
     deviation = Deviation(distance, closest_on_mesh(points, part).face, label)
     members = np.concatenate([np.asarray(hollow.vertices), [[0, 0, -1.0], [0, 0, -0.1]]])
     scan = Scan(points, noise=0.02, spacing=0.8)
-    found = measure_visibility(Solid(lost.vertices, lost.faces), part, scan, deviation, members, TOLERANCE)
+    field = ScanField(part, scan, deviation, TOLERANCE)
+    found = measure_visibility(Solid(lost.vertices, lost.faces), field, members)
     assert found.shut > 0.7
 
 

@@ -13,12 +13,13 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Floats, Part, Pose, Reason, Scan
+from damageest.geometry.scan_field import ScanField
 from damageest.job import load
 from damageest.pipeline import routes
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.engine import Branch, Engine, Route, start
 from damageest.pipeline.prepare import place_scan
-from damageest.pipeline.state import Candidate, FoundSite, JobState, Reasons, Value
+from damageest.pipeline.state import MADE_OF, Candidate, FoundSite, JobState, Reasons, Value, list_given
 from damageest.pipeline.steps import GATHERED, Step, find_value, step
 from damageest.registry import Registry
 from damageest.registry.contracts import Contract
@@ -84,7 +85,9 @@ def test_what_is_taken_was_given_before(method: str, registry: Registry, tmp_pat
     known = {*start(Engine(load(tmp_path / "job.yaml", registry), registry)).values, "folder", "target"}
     for item in walk((*routes.route_of(method), *routes.WRITE)):
         called = not isinstance(item, (Step, Branch)) and item.per_site
-        missing = [name for name in takes(item) if name not in known and not (called and hasattr(Candidate, name))]
+        missing = [
+            name for name in list_given(takes(item)) if name not in known and not (called and hasattr(Candidate, name))
+        ]
         assert not missing, name_of(item)
         known |= {*item.gives} if isinstance(item, Step) else set() if isinstance(item, Branch) else {item.gives}
 
@@ -248,3 +251,25 @@ def test_a_number_of_numpy_has_the_key_of_the_same_number() -> None:
     """What the cache gives back is a number of Python: the key has to be the same on the next run."""
     assert digest(np.float64(0.1)) == digest(0.1)
     assert digest(np.bool_(True), np.int64(3)) == digest(True, 3)
+
+
+def test_the_field_is_that_of_the_state_and_made_once(engine: Engine) -> None:
+    seen: list[ScanField] = []
+
+    @step(gives="intact")
+    def look(field: ScanField) -> Floats:
+        seen.append(field)
+        return field.feet
+
+    assert look.takes == ("field",)
+    state = begin(engine).with_value(JobState.aligned, Scan(POINTS), "a").with_named("tolerance", 0.2, "t")
+    field = ScanField.measure(state.part, state.aligned, 0.2)
+    state = state.with_value(JobState.deviation, field.deviation, "d")
+    first = engine.take(look, state)
+    again = engine.take(look, first)
+    assert again.key("intact") == first.key("intact")
+    assert state.field is first.field is seen[0] is seen[-1], "what follows from it is kept"
+    moved = state.with_value(JobState.deviation, field.deviation, "other")
+    assert moved.field is not seen[0]
+    assert engine.take(look, moved).key("intact") != first.key("intact")
+    assert set(MADE_OF["field"]) <= set(state.select(("field",)).values)

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Flags, Floats, Ints, Part, Samples, Scan, Sites
+from damageest.artefacts import Flags, Floats, Ints, Part, Samples, Sites
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import (
     find_in_box,
@@ -16,10 +16,11 @@ from damageest.geometry.neighbourhoods import (
     measure_local_areas,
 )
 from damageest.geometry.poisson import Grid, GridValues, refine_field
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import measure_bounds, number_cubes
 from damageest.stages.enclose._loss_surface import build_surface
 from damageest.stages.enclose._side import find_behind
-from damageest.stages.enclose._skin import BESIDE, SkinSamples, find_held, look_at_skin, push_outward
+from damageest.stages.enclose._skin import BESIDE, DamagedPoints, SkinSamples, find_held, look_at_skin, push_outward
 
 OF_SITE = 0.05
 """Share of the points of a site from which a group holds the site; a few stray ones do not."""
@@ -93,22 +94,21 @@ class IntactSkin:
 
 
 def sort_losses(
-    part: Part, aligned: Scan, deviation: Deviation, sites: Sites, nearby: Samples, tolerance: float, band: float
+    field: ScanField, sites: Sites, nearby: Samples, band: float
 ) -> tuple[tuple[LossGroup, ...], IntactSkin]:
     """Sorts scan points and skin samples into losses and intact skin.
 
     ``band``: width of skin round the damaged points that counts as neither lost nor intact, in tolerances.
     """
-    points, label, grown, of_scan = _grow_to_rim(aligned, deviation, sites, tolerance)
-    skin = look_at_skin(part, aligned, deviation, points, grown, nearby, tolerance, band * tolerance)
-    free = skin.away < np.maximum(band * tolerance, BESIDE * skin.usual)
-    asked = np.flatnonzero(free & (skin.away >= band * tolerance))
-    free[asked[find_held(part, aligned, deviation, of_scan, skin, asked, tolerance)]] = False
-    behind = find_behind(part, aligned, deviation, points, label, grown, skin, tolerance)
+    damaged, near = _grow_to_rim(field, sites), band * field.tolerance
+    skin = look_at_skin(field, damaged, nearby, near)
+    free = skin.away < np.maximum(near, BESIDE * skin.usual)
+    asked = np.flatnonzero(free & (skin.away >= near))
+    free[asked[find_held(field, damaged.index, skin, asked)]] = False
+    behind = find_behind(field, damaged, skin)
     free &= ~behind
     skin = replace(skin, bare=skin.bare & ~behind)
-    above, depth = part.face_normals[deviation.face[of_scan]], -deviation.distance[of_scan]
-    groups, lost_by = _group_losses(points, above, depth, label, skin, free, tolerance, aligned.spacing, aligned.noise)
+    groups, lost_by = _group_losses(field, damaged, skin, free)
     kept = np.flatnonzero((lost_by < 0) & ~free)
     return groups, IntactSkin(skin.points[kept], skin.normals[kept], skin.points)
 
@@ -161,15 +161,7 @@ def cut_beyond_reach(grid: Grid, field: GridValues, gathered: GatheredLosses, nu
 
 
 def _group_losses(
-    points: Floats,
-    above: Floats,
-    depth: Floats,
-    label: Ints,
-    skin: SkinSamples,
-    free: Flags,
-    tolerance: float,
-    spacing: float,
-    noise: float,
+    field: ScanField, damaged: DamagedPoints, skin: SkinSamples, free: Flags
 ) -> tuple[tuple[LossGroup, ...], Ints]:
     """The groups; and for each skin sample (S,) the number of the group that lost it, -1 for intact and unseen skin.
 
@@ -180,8 +172,12 @@ def _group_losses(
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    points, label, tolerance = damaged.points, damaged.site, field.tolerance
+    above, depth = field.find_normals(damaged.index), -field.distance[damaged.index]
     around = skin.usual[free] if free.any() else skin.usual
-    link = max(3 * tolerance, 1.5 * spacing, 1.2 * float(np.quantile(around, 0.9)) if len(around) else 0.0)
+    link = max(
+        3 * tolerance, 1.5 * field.aligned.spacing, 1.2 * float(np.quantile(around, 0.9)) if len(around) else 0.0
+    )
     bare = np.flatnonzero(skin.bare)
     all_points = np.concatenate([points, skin.points[bare]])
     cell, number = number_cubes(all_points, link / 2)
@@ -203,7 +199,9 @@ def _group_losses(
         lost = bare[of_bare == number]
         lost_by[lost] = len(groups)
         of_skin = skin.points[lost], skin.normals[lost]
-        surface = build_surface(points[members], above[members], depth[members], *of_skin, noise, 0.8 * tolerance)
+        surface = build_surface(
+            points[members], above[members], depth[members], *of_skin, field.aligned.noise, 0.8 * tolerance
+        )
         groups.append(LossGroup(*surface, skin.points[lost], labels))
     return tuple(groups), lost_by
 
@@ -223,14 +221,12 @@ def _join_by_site(group: Ints, label: Ints) -> Ints:
     return np.asarray(connected_components(links, directed=False)[1][group], np.int64)
 
 
-def _grow_to_rim(
-    aligned: Scan, deviation: Deviation, sites: Sites, tolerance: float
-) -> tuple[Floats, Ints, Flags, Ints]:
+def _grow_to_rim(field: ScanField, sites: Sites) -> DamagedPoints:
     """The sites' points, and neighbours that lie deeper than noise explains: the rim, where the damage is shallower
-    than the tolerance. Gives points (M,3), their sites (M,), which scan points (N,) were added, and the points' numbers
-    in the scan (M,)."""
-    deep = (sites.label == 0) & (deviation.distance < -max(2 * aligned.noise, 0.1 * tolerance))
-    deep &= deviation.distance >= -tolerance * 1.0001
+    than the tolerance."""
+    aligned, tolerance = field.aligned, field.tolerance
+    deep = (sites.label == 0) & (field.distance < -max(2 * aligned.noise, 0.1 * tolerance))
+    deep &= field.distance >= -tolerance * 1.0001
     candidates = np.flatnonzero(deep)
     seeds = np.flatnonzero(sites.label > 0)
     label = sites.label.astype(np.int64)
@@ -241,4 +237,4 @@ def _grow_to_rim(
         label[candidates[hit]] = label[seeds[index[hit, 0]]]
     grown = (label > 0) & (sites.label == 0)
     chosen = np.flatnonzero(label > 0)
-    return aligned.points[chosen], label[chosen], grown, chosen
+    return DamagedPoints(aligned.points[chosen], label[chosen], chosen, grown)

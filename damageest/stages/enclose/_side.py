@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import INTACT, Flags, Floats, Part
 from damageest.geometry.local_fits import smooth_points
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.orientation import find_signs
 from damageest.geometry.rays import prepare_rays
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin_near import NearCubes
 from damageest.geometry.vectors import normalise
-from damageest.stages.enclose._skin import SkinSamples
+from damageest.stages.enclose._skin import DamagedPoints, SkinSamples
 
 RIM = 4.0
 """How far from the damaged points intact ones show the side, in point spacings or tolerances."""
@@ -31,47 +32,34 @@ FEWEST = 8
 """Intact points at the rim, at least, for them to show the side."""
 
 
-def find_behind(
-    part: Part,
-    aligned: Scan,
-    deviation: Deviation,
-    damaged: Floats,
-    label: Ints,
-    grown: Flags,
-    skin: SkinSamples,
-    cell: float,
-) -> Flags:
-    """Which samples (S,) of the ``skin`` that no point shows lie behind the damaged points (M,3): the far skin of a
-    thin wall, on the side where metal is left.
+def find_behind(field: ScanField, damaged: DamagedPoints, skin: SkinSamples) -> Flags:
+    """Which samples (S,) of the ``skin`` that no point shows lie behind the damaged points: the far skin of a thin
+    wall, on the side where metal is left.
 
     An inner surface hangs on the intact skin at its rim, whose outward side is that of the part. It is carried from
     the intact points to the damaged ones along the scan. None is behind where the scan shows too little of the rim.
-
-    Args:
-        label: (M,) the site of each damaged point.
-        grown: (N,) scan points that count as damaged too.
-        cell: length below which nothing is resolved.
     """
+    part, aligned, cell = field.part, field.aligned, field.tolerance  # nothing is resolved below the tolerance
     behind = np.zeros(len(skin.points), bool)
     asked = np.flatnonzero(skin.bare & np.isfinite(skin.away))
-    intact = np.flatnonzero((deviation.label == INTACT) & ~grown)
-    if not len(damaged) or not len(asked) or not len(intact):
+    intact = np.flatnonzero((field.label == INTACT) & ~damaged.grown)
+    if not len(damaged.points) or not len(asked) or not len(intact):
         return behind
     reach = RIM * max(cell, aligned.spacing)
-    intact = intact[NearCubes.around(damaged, reach).holds(aligned.points[intact])]
-    rim = intact[np.isfinite(find_neighbours(aligned.points[intact], 1, damaged, reach)[0][:, 0])]
+    intact = intact[NearCubes.around(damaged.points, reach).holds(aligned.points[intact])]
+    rim = intact[np.isfinite(find_neighbours(aligned.points[intact], 1, damaged.points, reach)[0][:, 0])]
     rim = rim[pick_one_per_cube(aligned.points[rim], 0.5 * cell)] if len(rim) else rim
     if len(rim) < FEWEST:
         return behind
-    few = pick_one_per_cube(damaged, 0.5 * cell)
-    own = damaged[few]
+    few = pick_one_per_cube(damaged.points, 0.5 * cell)
+    own = damaged.points[few]
     points = np.concatenate([own, aligned.points[rim]])
     points, normals, _ = smooth_points(points, aligned.noise, min(FIT_COUNT, len(points) // 2))
-    outward = part.face_normals[deviation.face[rim]]
+    outward = field.find_normals(rim)
     evidence = np.concatenate([np.zeros(len(own)), np.einsum("ij,ij->i", normals[len(own) :], outward)])
     normals *= find_signs(points, normals, evidence)[:, None]
     distance, near = find_neighbours(skin.points[asked], min(AROUND, len(own)), points[: len(own)])
-    site = label[few][near[:, 0]]
+    site = damaged.site[few][near[:, 0]]
     way = (skin.points[asked] - points[near[:, 0]]) / np.maximum(distance[:, :1], 1e-300)
     height, facing = (np.einsum("ij,ij->i", one, normals[near[:, 0]]) for one in (way, skin.normals[asked]))
     is_behind = (height < -BELOW) & (facing < -BELOW)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import ADDED, INTACT, Deviation, Flags, Floats, Ints, Part, Samples, Scan
+from damageest.artefacts import ADDED, INTACT, Flags, Floats, Ints, Part, Samples
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import (
@@ -15,6 +15,7 @@ from damageest.geometry.neighbourhoods import (
     pick_one_per_cube,
     query_neighbours,
 )
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin_near import NearCubes
 from damageest.geometry.voxels import number_cubes
 
@@ -33,6 +34,17 @@ DEEP = 3.0
 
 
 @dataclass(frozen=True, eq=False)
+class DamagedPoints:
+    """The damaged points of a scan of N points: ``points`` (M,3), the ``site`` (M,) of each, and its number ``index``
+    (M,) in the scan. ``grown`` (N,): which of them stage `cluster` did not take for damaged."""
+
+    points: Floats
+    site: Ints
+    index: Ints
+    grown: Flags
+
+
+@dataclass(frozen=True, eq=False)
 class SkinSamples:
     """``points`` (S,3) on the part's skin round the damage, and their outward ``normals`` (S,3). ``bare`` (S,): whether
     no intact scan point is near and no added metal lies on it, though the scan is dense enough there. ``away`` (S,):
@@ -46,20 +58,12 @@ class SkinSamples:
     usual: Floats
 
 
-def look_at_skin(
-    part: Part,
-    aligned: Scan,
-    deviation: Deviation,
-    damaged: Floats,
-    grown: Flags,
-    nearby: Samples,
-    tolerance: float,
-    band: float,
-) -> SkinSamples:
-    """The samples ``nearby``, with what the scan shows on each. ``damaged`` (M,3): the damaged points; those ``grown``
-    (N,) of the scan are not intact. ``band``: width of skin round the damaged points that is near them."""
-    intact = (deviation.label == INTACT) & ~grown
-    added = deviation.label == ADDED
+def look_at_skin(field: ScanField, damaged: DamagedPoints, nearby: Samples, band: float) -> SkinSamples:
+    """The samples ``nearby``, with what the scan shows on each. ``band``: width of the skin that is near the damaged
+    points."""
+    part, aligned, tolerance = field.part, field.aligned, field.tolerance
+    intact = (field.label == INTACT) & ~damaged.grown
+    added = field.label == ADDED
     points, normals = nearby.points, nearby.normals
     if not len(points):
         none = np.zeros(0)
@@ -69,12 +73,12 @@ def look_at_skin(
     hit = aligned.points[keep]
     if not len(hit):
         usual = np.full(len(points), aligned.spacing)
-        away = _measure_away(points, damaged, max(band, BESIDE * aligned.spacing))
+        away = _measure_away(points, damaged.points, max(band, BESIDE * aligned.spacing))
         return SkinSamples(points, normals, np.ones(len(points), bool), away, usual)
     thin = pick_one_per_cube(hit, 0.35 * tolerance)
-    hit, face = hit[thin], deviation.face[keep][thin]
+    hit, face = hit[thin], field.deviation.face[keep][thin]
     gaps = _UsualGaps.measure(hit, tolerance)
-    away = _measure_away(points, damaged, max(band, BESIDE * gaps.most))
+    away = _measure_away(points, damaged.points, max(band, BESIDE * gaps.most))
     # Skin under added metal has no scan points, but no metal is lost there: the places below the added points cover it.
     above = aligned.points[hits & added]
     if len(above):
@@ -103,9 +107,7 @@ def _measure_away(points: Floats, damaged: Floats, reach: float) -> Floats:
     return find_neighbours(points, 1, damaged, reach)[0][:, 0]
 
 
-def find_held(
-    part: Part, aligned: Scan, deviation: Deviation, damaged: Ints, skin: SkinSamples, asked: Ints, tolerance: float
-) -> Flags:
+def find_held(field: ScanField, damaged: Ints, skin: SkinSamples, asked: Ints) -> Flags:
     """Which of the skin samples ``asked`` (K,) an intact scan point shows to be there, though damaged points are near.
 
     In a sparse scan the rim lies somewhere in a gap between damaged and intact points, and skin beyond the intact ones
@@ -115,11 +117,12 @@ def find_held(
     if not len(asked):
         return np.zeros(0, bool)
     width = float(np.median(skin.usual[asked]))
-    on_skin = (deviation.label == INTACT) & (deviation.distance >= -max(2 * aligned.noise, 0.1 * tolerance))
+    points, distance = field.points, field.distance
+    on_skin = (field.label == INTACT) & (distance >= -max(2 * field.aligned.noise, 0.1 * field.tolerance))
     on_skin[damaged] = False
-    intact = np.flatnonzero(on_skin & NearCubes.around(skin.points[asked], 2 * width).holds(aligned.points))
-    is_deep = -deviation.distance[damaged] >= width
-    feet = aligned.points[damaged] - deviation.distance[damaged, None] * part.face_normals[deviation.face[damaged]]
+    intact = np.flatnonzero(on_skin & NearCubes.around(skin.points[asked], 2 * width).holds(points))
+    is_deep = -distance[damaged] >= width
+    feet = field.find_feet(damaged)
     if not len(intact) or is_deep.all():
         return np.zeros(len(asked), bool)
     # The normals are further coordinates: points on the far side of a thin wall do not show this side.
@@ -127,7 +130,7 @@ def find_held(
         np.concatenate([at, width * way], axis=1)
         for at, way in (
             (skin.points[asked], skin.normals[asked]),
-            (aligned.points[intact], part.face_normals[deviation.face[intact]]),
+            (points[intact], field.find_normals(intact)),
         )
     )
     to_intact = find_neighbours(places, 1, seen)[0][:, 0]

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from damageest.artefacts import Deviation, Enclosure, Enclosures, Floats, Part, Samples, Scan, Sites
 from damageest.errors import StageError
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import measure_bounds
 from damageest.stages.enclose import EncloseAll
 
@@ -58,7 +59,8 @@ class Implicit(EncloseAll):
 
         if not sites.count:
             return Enclosures(())
-        groups, skin = sort_losses(part, aligned, deviation, sites, nearby, tolerance, self.band)
+        scanned = ScanField(part, aligned, deviation, tolerance)
+        groups, skin = sort_losses(scanned, sites, nearby, self.band)
         grids = [self._make_grid(np.concatenate([group.points, group.lost]), tolerance) for group in groups]
         gathered = push_intact(part, groups, skin, grids, self.push * tolerance)
         items = []

@@ -137,7 +137,7 @@ def test_more_points_give_a_better_surface_where_it_is_curved() -> None:
 @pytest.mark.slow
 def test_skin_samples_reach_as_far_as_the_grid_does() -> None:
     case, wide = scene("edge"), Implicit(margin=60)
-    nearby = sample_near_damage(**case.inputs(), encloser_at_once=wide)
+    nearby = sample_near_damage(case.field, case.sites, wide)
     skin = EdgeAware().run(part=case.part, tolerance=10 * TOLERANCE).points
     reached = KDTree(case.of_sites()).query(skin)[0] < 60 * TOLERANCE
     assert KDTree(nearby.points).query(skin[reached])[0].max() < nearby.spacing

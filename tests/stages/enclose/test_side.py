@@ -11,10 +11,11 @@ import trimesh
 import damageest
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Part, Scan
 from damageest.geometry.distance import closest_on_mesh, signed_distance
+from damageest.geometry.scan_field import ScanField
 from damageest.io.meshes import write_points
 from damageest.registry import Registry
 from damageest.stages.enclose._side import find_behind
-from damageest.stages.enclose._skin import SkinSamples
+from damageest.stages.enclose._skin import DamagedPoints, SkinSamples
 
 TOLERANCE, RADIUS = 0.15, 9.0
 """The pit is a cap of a ball, without an edge at its rim."""
@@ -49,17 +50,14 @@ def ask_behind(part: Part, points: np.ndarray, skin: np.ndarray, rim: bool = Tru
     samples = SkinSamples(
         skin, part.face_normals[found], np.ones(len(skin), bool), np.zeros(len(skin)), np.ones(len(skin))
     )
-    damaged = points[label == DAMAGE]
-    return find_behind(
-        part,
+    damaged = np.flatnonzero(label == DAMAGE)
+    scan, deviation = (
         Scan(points, noise=0.02, spacing=0.8),
         Deviation(distance, closest_on_mesh(points, part).face, label),
-        damaged,
-        np.ones(len(damaged), int),
-        np.zeros(len(points), bool) if rim else label == INTACT,
-        samples,
-        TOLERANCE,
     )
+    grown = np.zeros(len(points), bool) if rim else label == INTACT
+    own = DamagedPoints(points[damaged], np.ones(len(damaged), int), damaged, grown)
+    return find_behind(ScanField(part, scan, deviation, TOLERANCE), own, samples)
 
 
 @pytest.mark.parametrize("turned", [False, True])
