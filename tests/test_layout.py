@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import re
 from pathlib import Path
 
@@ -65,6 +66,48 @@ def test_architecture_names_each_folder() -> None:
     text = (ROOT / "ARCHITECTURE.md").read_text()
     folders = {path.parent.relative_to(ROOT).as_posix() for path in (ROOT / "damageest").glob("*/__init__.py")}
     assert not [folder for folder in folders if f"{folder.split('/')[1]}/" not in text]
+
+
+MOST_PARAMETERS = 8
+THIRD_PARTIES = {
+    "damageest/api.py run",
+    "damageest/geometry/make_part.py make_part",
+    "damageest/io/scans.py make_scan",
+    "damageest/isolation/worker.py call_isolated",
+}
+"""Public functions whose keywords are in the code of others."""
+LEFT = {
+    "damageest/stages/align/_choose.py _is_continuous",
+    "damageest/stages/align/_datum_fit.py _describe",
+    "damageest/stages/align/_fit_start.py fit_from_start",
+}
+"""Functions that still have more. None may come to be here."""
+HEADER = re.compile(r"^([ \t]*(?:@.*\n[ \t]*)*)(?:async )?def (\w+)(\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))", re.MULTILINE)
+"""Decorators, name and parameters of a function: whole files need not be parsed, which takes seconds for all."""
+
+
+def find_crowded(path: Path) -> set[str]:
+    """The functions of a file that take too many values, but for compiled loops and commands of the command line."""
+    own = path.relative_to(ROOT)
+    crowded = set()
+    for decorators, name, parameters in HEADER.findall(path.read_text(encoding="utf-8")):
+        if parameters.count(",") < MOST_PARAMETERS or "@compile_loops" in decorators:
+            continue
+        if name.endswith("command") and ("cli" in own.parts or "commands" in own.parts):
+            continue
+        (function,) = ast.parse(f"def {name}{parameters}: ...").body
+        assert isinstance(function, ast.FunctionDef)
+        taken = function.args
+        each = [*taken.posonlyargs, *taken.args, *taken.kwonlyargs, *filter(None, (taken.vararg, taken.kwarg))]
+        if sum(one.arg not in ("self", "cls") for one in each) > MOST_PARAMETERS:
+            crowded.add(f"{own.as_posix()} {name}")
+    return crowded
+
+
+def test_functions_take_few_values() -> None:
+    """What belongs together is a value of its own: a field, a loss, a target."""
+    crowded = set().union(*map(find_crowded, SOURCES))
+    assert crowded == THIRD_PARTIES | LEFT
 
 
 LISTED = ("artefacts", "batches", "checks", "inspection", "io", "isolation", "job", "registry")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -37,9 +38,16 @@ LEFT, SMALL = 1.15, 0.15
 is not small, in tolerances. Errors that regions of a scan share are no form."""
 
 
+class Climbed(NamedTuple):
+    """The ``trials`` of fields, and the one that was ``chosen``, fitted to all points."""
+
+    trials: list[Trial]
+    chosen: Trial
+
+
 def climb(
     points: Floats, body: Body, diagonal: float, tolerance: float, lattice: Sequence[int], strain: float
-) -> tuple[list[Trial], Trial]:
+) -> Climbed:
     """The fields that were tried on half of the points (N,3), and the one that held-out patches bear out, fitted to all
     of them. ``lattice``: cells along the longest edge of the box of the lattices that may be tried. ``strain``: beyond
     it a field has to explain the skin down to the noise."""
@@ -51,10 +59,10 @@ def climb(
         ladder.climb_lattice(cells)
     chosen = ladder.chosen
     if chosen is ladder.trials[0]:
-        return ladder.trials, chosen
+        return Climbed(ladder.trials, chosen)
     body = replace(body, basis=chosen.field.basis)
     fitted = fit(chosen.field, points, body, chosen.freedom, [ladder.scales[-1]] * LAST)
-    return ladder.trials, replace(chosen, field=fitted)
+    return Climbed(ladder.trials, replace(chosen, field=fitted))
 
 
 @dataclass(eq=False)

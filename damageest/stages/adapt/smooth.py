@@ -17,7 +17,7 @@ from damageest.stages import JobPaths
 from damageest.stages.adapt import Adapt
 from damageest.stages.adapt._body import prepare, thin
 from damageest.stages.adapt._choose import SHARE, Score, Trial
-from damageest.stages.adapt._climb import BENT, RIGID, WIDEST, choose_scales, climb, score
+from damageest.stages.adapt._climb import BENT, RIGID, WIDEST, Climbed, choose_scales, climb, score
 from damageest.stages.adapt._field import Body, Field, match, weigh
 from damageest.stages.adapt._fit import fit
 from damageest.stages.adapt._mesh import deform_part, refine, require_injective
@@ -96,10 +96,10 @@ class Smooth(Adapt):
             start = start_from(forms, part, points, body, choose_scales(points, body, tolerance), tolerance)
         if start and start.used.is_used and (adapted := self._go_on(start, part, centre, points, body, tolerance)):
             return adapted
-        trials, chosen = climb(points, body, part.diagonal, tolerance, self.lattice, STRAINS[self.process])
-        if chosen is trials[0]:
+        climbed = climb(points, body, part.diagonal, tolerance, self.lattice, STRAINS[self.process])
+        if climbed.chosen is climbed.trials[0]:
             return None
-        adapted = self._finish(part, centre, points, body, trials, chosen, tolerance)
+        adapted = self._finish(part, centre, points, body, climbed, tolerance)
         if start is None:
             return adapted
         unused = replace(start, used=replace(start.used, is_used=False))
@@ -115,21 +115,22 @@ class Smooth(Adapt):
         own, moved = prepare(shape, centre, tolerance, body.noise), move_points(points, start.motion)
         held = start.find_held(len(points))
         strain = STRAINS[self.process]
-        trials, chosen = climb(np.concatenate([moved, held]), own, part.diagonal, tolerance, self.lattice, strain)
+        climbed = climb(np.concatenate([moved, held]), own, part.diagonal, tolerance, self.lattice, strain)
         # the points that hold the field where no skin is left are no part of the scan
-        after = score(chosen.field, chosen.freedom, moved, own, part.diagonal, tolerance)
+        after = score(climbed.chosen.field, climbed.chosen.freedom, moved, own, part.diagonal, tolerance)
         rigid = fit(Field.zero(body.basis), points[::2], body, RIGID, choose_scales(points, body, tolerance))
         before = score(rigid, RIGID, points, body, part.diagonal, tolerance)
         if after.both.mean() > (1 - SHARE) * before.both.mean():
             return None
-        return self._finish(part, centre, moved, own, trials, chosen, tolerance, start, (before, after))
+        return self._finish(part, centre, moved, own, climbed, tolerance, start, (before, after))
 
     def _finish(
-        self, part: Part, centre: Floats, points: Floats, body: Body, trials: list[Trial], chosen: Trial,
-        tolerance: float, start: Start | None = None, scores: tuple[Score, Score] | None = None,
+        self, part: Part, centre: Floats, points: Floats, body: Body, climbed: Climbed, tolerance: float,
+        start: Start | None = None, scores: tuple[Score, Score] | None = None,
     ) -> AdaptedPart:  # fmt: skip
         """The adapted part: of the chosen field, after the ``start`` that other parts gave, where there is one; the
         ``scores`` are then those of the part as designed and of both."""
+        trials, chosen = climbed
         field, body = chosen.field, replace(body, basis=chosen.field.basis)
         before, after = scores or (trials[0].score, chosen.score)
         found = match(field, points, body)

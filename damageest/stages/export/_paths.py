@@ -25,12 +25,10 @@ def write_paths(
     T: Floats | None,
     names: Sequence[str],
     writers: Mapping[str, PathWriter],
-    header: str | None,
-    footer: str | None,
-    options: Mapping[str, str],
-    machine: Path | str | None = None,
+    settings: PathSettings,
 ) -> ExportedFiles:
-    """Writes each site's path in the formats ``names``, below ``place``.
+    """Writes each site's path in the formats ``names``, below ``place``. ``settings``: those of the job, to which each
+    site adds its title and number.
 
     ``T`` (4,4) takes a point from the part's frame to that of the files; None for none. A path with a set-up frame is
     written in that frame, and ``site-1.setup.json`` has the transform from the frame of the other files to it. Meshes
@@ -41,14 +39,12 @@ def write_paths(
     for site in result.sites:
         if site.path is None:
             continue
-        settings = PathSettings(
-            result.units, f"{result.name} site {site.id}", header, footer, options, site.id, machine
-        )
+        own = replace(settings, title=f"{result.name} site {site.id}", site=site.id)
         moved = _move_path(site.path, T)
         (folder / f"{place}path").mkdir(parents=True, exist_ok=True)
         for writer in (writers[name] for name in names):
             name = f"{place}path/site-{site.id}.{writer.suffix}"
-            said += [f"{name}: {note}" for note in writer.write(folder / name, moved, settings) or ()]
+            said += [f"{name}: {note}" for note in writer.write(folder / name, moved, own) or ()]
             files.append(name)
         if names and moved.setup is not None and describe_setup(moved):
             name = f"{place}path/site-{site.id}.setup.json"

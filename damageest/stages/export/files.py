@@ -139,8 +139,9 @@ class Files(Export):
             done.append(ready)
         for place, T in here.items():
             done += self._write_shapes(result, shapes, folder, place, T, writers, ready.files)
-            told = (_read_text(self.path_header), _read_text(self.path_footer), self.path_options, self.machine)
-            done.append(write_paths(result, folder, place, T, self.paths, path_writers, *told))
+            head, foot = _read_text(self.path_header), _read_text(self.path_footer)
+            told = PathSettings(result.units, "", head, foot, self.path_options, machine=self.machine)
+            done.append(write_paths(result, folder, place, T, self.paths, path_writers, told))
             if splines:
                 patches = {number: patch for number, (patch, _) in splines.items() if patch}
                 done += _write_patches(writers, folder, place, patches, T, result.units)

@@ -22,7 +22,7 @@ from damageest.result import Result, Site
 from damageest.rules.notes import fold_notes
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._page import choose_tone, list_volumes
-from damageest.stages.report._pdf_book import Book, Letterhead, clean_line
+from damageest.stages.report._pdf_book import Book, clean_line
 from damageest.stages.report._pdf_budget import show_budget
 from damageest.stages.report._pdf_parts import (
     FOOT,
@@ -46,7 +46,6 @@ from damageest.stages.report._pdf_sections import show_sections
 from damageest.stages.report._section import lay_out_site
 from damageest.stages.report._sites import Remains, Shown
 from damageest.stages.report._thin import thin_mesh
-from damageest.stages.report._words import Words
 
 MOST_ROWS = 12
 """Sites in the summary; all have a page."""
@@ -56,17 +55,14 @@ TRIANGLES = 60_000
 """Triangles of the picture of the whole part."""
 
 
-def write_pdf(
-    path: Path, result: Result, content: Mapping[str, Any], job_text: str, sites: Sequence[Shown], remains: Remains,
-    direction: Any, letterhead: Letterhead, words: Words,
-) -> None:  # fmt: skip
+def write_pdf(path: Path, book: Book, sites: Sequence[Shown], remains: Remains, direction: Any) -> None:
     """Writes the PDF. The same result gives the same bytes: there is no date but those that are signed.
 
-    ``content``: that of result.json; ``job_text``: that of job.yaml; ``sites``: as the page shows them; ``direction``
-    (3,): from which the part is looked at. Raises OSError where the logo cannot be read.
+    ``sites``: as the page shows them; ``direction`` (3,): from which the part is looked at. Raises OSError where the
+    logo cannot be read.
     """
     register_fonts()
-    book = Book(result, content, job_text, words, letterhead)
+    result = book.result
     story: list[Any] = [*_summarise(book, _draw_part(result, remains, direction))]
     if result.sections:
         story += [PageBreak(), *show_sections(book)]
@@ -78,8 +74,8 @@ def write_pdf(
     canvas = type("NumberedPages", (Pages,), {"number_text": numbered})
     document = BaseDocTemplate(
         str(path), pagesize=A4, leftMargin=MARGIN, rightMargin=MARGIN, topMargin=HEAD, bottomMargin=FOOT,
-        title=f"{book.words.tell('Damage report')}: {result.name}", author=letterhead.company or "damageest",
-        creator=f"damageest {content['versions']['damageest']}", invariant=1,
+        title=f"{book.words.tell('Damage report')}: {result.name}", author=book.letterhead.company or "damageest",
+        creator=f"damageest {book.content['versions']['damageest']}", invariant=1,
     )  # fmt: skip
     frame = Frame(MARGIN, FOOT, WIDTH, A4[1] - HEAD - FOOT, 0, 0, 0, 0)
     document.addPageTemplates(PageTemplate("page", [frame], onPage=lambda pen, _: _draw_head(pen, book)))

@@ -80,10 +80,10 @@ class Html(Report):
         files = ["report.html"]
         if self.pdf:
             from damageest.stages.report._pdf import write_pdf
-            from damageest.stages.report._pdf_book import Letterhead
+            from damageest.stages.report._pdf_book import Book, Letterhead
 
-            head = Letterhead(self.company, self.logo)
-            write_pdf(folder / "report.pdf", result, content, job_text, sites, remains, start, head, words)
+            book = Book(result, content, job_text, words, Letterhead(self.company, self.logo))
+            write_pdf(folder / "report.pdf", book, sites, remains, start)
             files.append("report.pdf")
         picture = next((site.picture for site in sites if site.picture), b"")
         return ReportFiles(tuple(files), picture=picture)

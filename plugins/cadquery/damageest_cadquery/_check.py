@@ -41,30 +41,34 @@ class Measured:
     off_cad: float = np.nan
 
 
-def check_pieces(
-    form: str,
-    pieces: Sequence[Piece],
-    cut_off: float,
-    bodies: int,
-    damage: Solid,
-    surface: Surface,
-    part: Part,
-    points: Floats,
-    tolerance: float,
-    cad_faces: Sequence[Any],
-    off_faces: float = 0.0,
-) -> Measured:
-    """Measures the pieces of a damage volume, all in the part's frame and the job's unit.
+@dataclass(frozen=True, eq=False)
+class Target:
+    """What an exact damage volume has to agree with, in the part's frame and the job's unit.
 
-    ``cut_off``: area of new faces on what is left of the part; ``bodies``: how many solids are expected; ``points``
-    (N,3): the scan's points on the inner damage surface;
-    ``cad_faces``: the part's faces by number; ``off_faces``: how far their own corners may lie off them.
+    The ``damage`` volume as a mesh, its inner ``surface``, the scan ``points`` (N,3) on that; the ``part``, its
+    ``cad_faces`` by number, and how far their own corners may lie off them (``off_faces``).
+    """
+
+    damage: Solid
+    surface: Surface
+    points: Floats
+    part: Part
+    tolerance: float
+    cad_faces: Sequence[Any]
+    off_faces: float = 0.0
+
+
+def check_pieces(form: str, pieces: Sequence[Piece], cut_off: float, bodies: int, target: Target) -> Measured:
+    """Measures the pieces of a damage volume.
+
+    ``cut_off``: area of new faces on what is left of the part; ``bodies``: how many solids are expected.
     """
     from OCP.BRep import BRep_Tool
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_FACE, TopAbs_SHELL
     from OCP.TopoDS import TopoDS
 
+    damage, surface, part, tolerance = target.damage, target.surface, target.part, target.tolerance
     volume = sum(measure_volume(piece.shape) for piece in pieces)
 
     def refuse(reason: str, *numbers: float) -> Measured:
@@ -100,8 +104,8 @@ def check_pieces(
     beyond = max(float(weights[there > quarter].sum()), float(areas[back > quarter].sum()))
     distance = max(_find_quantile(there, weights), _find_quantile(back, areas))
     farthest = max(float(there.max()), float(back.max()))
-    near = ON_CAD * part.diagonal + off_faces
-    off = max((_measure_off(face, cad_faces[number], near) for face, (number, _) in faces if number >= 0), default=0.0)
+    near, cad = ON_CAD * part.diagonal + target.off_faces, target.cad_faces
+    off = max((_measure_off(face, cad[number], near) for face, (number, _) in faces if number >= 0), default=0.0)
     numbers = (distance, farthest, beyond, off)
     if off > near:
         return refuse(f"an outer corner lies {off / tolerance:.2g} tolerances off the CAD's surface", *numbers)
@@ -110,7 +114,7 @@ def check_pieces(
         return refuse(
             f"up to {farthest / tolerance:.2g} tolerances from the mesh, on {beyond:.1%} more than a quarter", *numbers
         )
-    if beyond > 0.01 and not _is_nearer(points, inner, surface, quarter):
+    if beyond > 0.01 and not _is_nearer(target.points, inner, surface, quarter):
         return refuse("the scan's points are nearer to the mesh", *numbers)
     return Measured(volume, "", *numbers)
 

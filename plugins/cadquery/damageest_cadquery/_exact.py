@@ -19,7 +19,7 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Solid, Surface
 from damageest_cadquery._attempts import call, list_tools
 from damageest_cadquery._balance import Balance
-from damageest_cadquery._check import Measured, check_pieces, measure_inner_area
+from damageest_cadquery._check import Measured, Target, check_pieces, measure_inner_area
 from damageest_cadquery._claims import find_coarse
 from damageest_cadquery._cut import make_cut
 from damageest_cadquery._pieces import Taken, count_bodies, take_pieces
@@ -101,7 +101,8 @@ def find_exact(
     bodies, refused = count_bodies(site.damage, solids, tolerance), ""
     second: Exact | None = None
     stale, best = Counter[str](), dict[str, float]()
-    work = _Work(site, solids, faces, part, tolerance, off, bodies, measure_inner_area(solids))
+    target = Target(site.damage, site.surface, site.points, part, tolerance, faces, off)
+    work = _Work(site, solids, target, bodies, measure_inner_area(solids))
     coarse = find_coarse([piece.shape for piece in solids], tolerance)
     balance = Balance(solids, part, site.damage, tolerance)
     for form, make, fuzzies, shift in list_tools(cut, part, tolerance):
@@ -165,17 +166,18 @@ class _Work:
 
     site: SiteInput
     solids: Sequence[Piece]
-    faces: Sequence[Any]
-    part: Part
-    tolerance: float
-    off: float
+    target: Target
     bodies: int
     inner_before: float
+
+    @property
+    def faces(self) -> Sequence[Any]:
+        return self.target.cad_faces
 
     def split(self, tool: Tool, kind: str, fuzzy: float) -> _Trial:
         """What a tool gives, checked."""
         site = self.site
-        found = take_pieces(self.solids, tool, fuzzy, site.damage, self.tolerance)
+        found = take_pieces(self.solids, tool, fuzzy, site.damage, self.target.tolerance)
         if isinstance(found, str):
             return _Trial(Measured(0.0, found))
         pieces, rest = found.damage, found.rest
@@ -193,14 +195,10 @@ class _Work:
         return _Trial(measured, pieces, rest, bool(final), found.doubles)
 
     def _check(self, kind: str, found: Taken, pieces: Sequence[Piece]) -> Measured:
-        site = self.site
         elsewhere = measure_inner_area(found.rest) - self.inner_before
         elsewhere -= measure_inner_area([*found.doubles, *found.specks])
         bodies = self.bodies + len(pieces) - len(found.damage)
-        return check_pieces(
-            kind, pieces, elsewhere, bodies, site.damage, site.surface, self.part, site.points, self.tolerance,
-            self.faces, self.off,
-        )  # fmt: skip
+        return check_pieces(kind, pieces, elsewhere, bodies, self.target)
 
 
 def _move(

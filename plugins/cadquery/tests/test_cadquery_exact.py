@@ -376,15 +376,14 @@ def test_a_mesh_has_no_exact_form(done: Run, tmp_path: Path) -> None:
 
 
 def test_a_wrong_volume_is_refused(done: Run) -> None:
-    from damageest_cadquery._check import check_pieces
+    from damageest_cadquery._check import Target, check_pieces
     from damageest_cadquery._exact import start_solids
 
     part = done.result.part
     solids, faces = start_solids(read(Path(part.path), ".step").solids)
     site = done.result.sites[0]
-    found = check_pieces(
-        "facets", solids, 0.0, 1, site.damage, site.surface, part, np.empty((0, 3)), done.result.tolerance, faces
-    )
+    target = Target(site.damage, site.surface, np.empty((0, 3)), part, done.result.tolerance, faces)
+    found = check_pieces("facets", solids, 0.0, 1, target)
     assert "volume differs" in found.reason
 
 

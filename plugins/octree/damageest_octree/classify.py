@@ -92,7 +92,10 @@ def classify_nodes(
     shallow = mark(seen) & (in_part | is_skin) & ~is_intact
     blocked = is_intact | is_shell | shallow
     void = _flood_from_outside(tree, pairs, ~blocked)
-    leak = _measure_leak(cube, tree, in_part & ~blocked, void, part, aligned, deviation, intact, damaged, reach)
+    probes = np.flatnonzero(intact)
+    probes = probes[:: max(1, len(probes) // PROBES)]
+    places, normals = aligned.points[probes], part.face_normals[deviation.face[probes]]
+    leak = _measure_leak(cube, tree, in_part & ~blocked, void, places, normals, damaged, reach)
     return NodeFlags(
         tree, in_part, is_skin, is_intact, mark(damaged_cells) | shallow, is_shell | shallow, void, reach, leak, unseen
     )  # fmt: skip
@@ -171,16 +174,12 @@ def _find_intact_skin(cube: Cube, skin: Ints, intact: Floats, damaged: Floats, f
 
 
 def _measure_leak(
-    cube: Cube, tree: Tree, full: Flags, void: Flags, part: Part, aligned: Scan, deviation: Deviation, intact: Flags,
-    damaged: Floats, reach: int,
-) -> float:  # fmt: skip
-    """Share of probes, three cells under intact skin and far from any damage, that the flood reached."""
+    cube: Cube, tree: Tree, full: Flags, void: Flags, points: Floats, normals: Floats, damaged: Floats, reach: int
+) -> float:
+    """Share of probes, three cells under ``points`` (N,3) of intact skin with these ``normals`` (N,3) and far from any
+    damage, that the flood reached."""
     from scipy.spatial import cKDTree
 
-    chosen = np.flatnonzero(intact)
-    chosen = chosen[:: max(1, len(chosen) // PROBES)]
-    points = aligned.points[chosen]
-    normals = part.face_normals[deviation.face[chosen]]
     far = cKDTree(damaged).query(points, workers=2)[0] > (2 * reach + 8) * cube.cell
     nodes = tree.locate(cube.find_cells(points[far] - 3 * cube.cell * normals[far]))
     inside = full[nodes]

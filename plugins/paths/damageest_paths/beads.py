@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -162,28 +163,42 @@ def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, i
     for first in range(0, len(points), max(CHUNK // len(ball), 1)):
         own = slice(first, first + max(CHUNK // len(ball), 1))
         which = owner[own]
-        ahead, behind = (stop - start)[which] * (1 - share[own, None]), (stop - start)[which] * share[own, None]
-        width, height = beads.width[which], beads.height[which]
-        _stamp(done, points[own], middle[own], normal[which], ahead, behind, width, height, ball, low, edge)
+        way = (stop - start)[which]
+        tops = _Tops(
+            points[own], middle[own], normal[which], way * (1 - share[own, None]), way * share[own, None],
+            beads.width[which], beads.height[which],
+        )  # fmt: skip
+        _stamp(done, tops, ball, low, edge)
     return done
 
 
-def _stamp(
-    done: NDArray[np.bool_], points: Floats, middle: Floats, normal: Floats, ahead: Floats, behind: Floats,
-    width: Floats, height: Floats, ball: NDArray[np.int64], low: Floats, edge: float,
-) -> None:  # fmt: skip
-    """Marks the voxels near ``points`` (N,3) on the tops of beads that lie in the bead: as high as the layer, and not
-    farther than half its width from the line that goes on ``ahead`` (N,3) and ``behind`` (N,3)."""
-    cell = np.floor((middle - low) / edge).astype(np.int64)[:, None] + ball
-    away = low + (cell + 0.5) * edge - points[:, None]
-    front, back = np.linalg.norm(ahead, axis=1), np.linalg.norm(behind, axis=1)
-    line = (ahead + behind) / np.maximum(front + back, 1e-300)[:, None]
+class _Tops(NamedTuple):
+    """Points (N,3) on the tops of beads: the ``middle`` (N,3) of the bead below each, its ``normal`` (N,3), how far its
+    line goes on ``ahead`` (N,3) and ``behind`` (N,3), its ``width`` (N,) and ``height`` (N,)."""
+
+    points: Floats
+    middle: Floats
+    normal: Floats
+    ahead: Floats
+    behind: Floats
+    width: Floats
+    height: Floats
+
+
+def _stamp(done: NDArray[np.bool_], tops: _Tops, ball: NDArray[np.int64], low: Floats, edge: float) -> None:
+    """Marks the voxels near the tops of beads that lie in the bead: as high as the layer, and not farther than half its
+    width from the line."""
+    normal, height = tops.normal, tops.height
+    cell = np.floor((tops.middle - low) / edge).astype(np.int64)[:, None] + ball
+    away = low + (cell + 0.5) * edge - tops.points[:, None]
+    front, back = np.linalg.norm(tops.ahead, axis=1), np.linalg.norm(tops.behind, axis=1)
+    line = (tops.ahead + tops.behind) / np.maximum(front + back, 1e-300)[:, None]
     along = np.einsum("nmi,ni->nm", away, line)
     beside = np.clip(along, -back[:, None], front[:, None])
     up = np.einsum("nmi,ni->nm", away, normal) - beside * np.einsum("ni,ni->n", line, normal)[:, None]
     across = np.einsum("nmi,nmi->nm", away, away) - up**2 - beside * (2 * along - beside)
     tiny = 1e-9 * edge
-    inside = (up <= tiny) & (up >= -height[:, None] - tiny) & (across <= (width[:, None] / 2) ** 2 + tiny)
+    inside = (up <= tiny) & (up >= -height[:, None] - tiny) & (across <= (tops.width[:, None] / 2) ** 2 + tiny)
     inside &= ((cell >= 0) & (cell < np.array(done.shape))).all(axis=2)
     x, y, z = cell[inside].T
     done[x, y, z] = True

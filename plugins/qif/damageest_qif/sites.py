@@ -58,22 +58,10 @@ def add_site(lists: Lists, result: Result, site: Site, lost: Lost) -> None:
     )
     if has_surface:
         lists.point_sets.append(_make_points(points, site.surface))
-    status = STATUS[site.verdict.level]
-    add_characteristic(
-        lists, "Linear", f"{name} depth", "largest depth of the loss below the nominal surface", item, measured, status,
-        site.max_depth, site.depth_95,
-    )  # fmt: skip
-    add_characteristic(
-        lists,
-        "Area",
-        f"{name} area",
-        "area of the nominal surface that is lost",
-        item,
-        measured,
-        status,
-        lost.area,
-        None,
-    )
+    feature = Feature(name, item, measured, STATUS[site.verdict.level])
+    what = "largest depth of the loss below the nominal surface"
+    add_characteristic(lists, feature, "depth", "Linear", what, site.max_depth, site.depth_95)
+    add_characteristic(lists, feature, "area", "Area", "area of the nominal surface that is lost", lost.area, None)
 
 
 def make_item(kind: str, number: str, nominal: str, name: str) -> Element:
@@ -84,14 +72,23 @@ def make_item(kind: str, number: str, nominal: str, name: str) -> Element:
     )
 
 
+class Feature(NamedTuple):
+    """A feature that was measured: its ``name``, the numbers of its ``item`` and of its measurement, and its
+    ``status``."""
+
+    name: str
+    item: str
+    measured: str
+    status: str
+
+
 def add_characteristic(
-    lists: Lists, kind: str, name: str, what: str, item: str, measured: str, status: str, value: float,
-    interval: Interval | None,
-) -> None:  # fmt: skip
-    """Adds a measured length or area without a tolerance. Half of the 95 % ``interval`` is its expanded uncertainty, so
-    that a quarter of it is the combined one."""
+    lists: Lists, feature: Feature, quantity: str, kind: str, what: str, value: float, interval: Interval | None
+) -> None:
+    """Adds a measured length or area of a feature, without a tolerance. Half of the 95 % ``interval`` is its expanded
+    uncertainty, so that a quarter of it is the combined one."""
     definition, nominal, of_item, number = (lists.numbers.take() for _ in range(4))
-    prefix = f"UserDefined{kind}Characteristic"
+    prefix, name = f"UserDefined{kind}Characteristic", f"{feature.name} {quantity}"
     lists.definitions.append(
         make(
             f"{prefix}Definition", make("Name", text=name), make("NonTolerance", text="MEASURED"),
@@ -109,7 +106,7 @@ def add_characteristic(
     )
     lists.items.append(
         make(
-            f"{prefix}Item", make("Name", text=name), refer("FeatureItemIds", [item]),
+            f"{prefix}Item", make("Name", text=name), refer("FeatureItemIds", [feature.item]),
             make("CharacteristicNominalId", text=nominal), id=of_item,
         )
     )  # fmt: skip
@@ -119,9 +116,9 @@ def add_characteristic(
     lists.measurements.append(
         make(
             f"{prefix}Measurement",
-            make("Status", make("CharacteristicStatusEnum", text=status)),
+            make("Status", make("CharacteristicStatusEnum", text=feature.status)),
             make("CharacteristicItemId", text=of_item),
-            refer("FeatureMeasurementIds", [measured]),
+            refer("FeatureMeasurementIds", [feature.measured]),
             make("Value", text=write_number(value), **uncertain),
             id=number,
         )

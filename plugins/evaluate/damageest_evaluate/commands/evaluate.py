@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -27,11 +26,10 @@ from damageest_evaluate.commands import (
     steady,
     worn,
 )
-from damageest_evaluate.commands._counted import AsJson, format_command, prepare_places, show_table
-from damageest_evaluate.commands.intervals import run_intervals
+from damageest_evaluate.commands._counted import AsJson, format_command, prepare_places, run_counted, show_table
+from damageest_evaluate.commands.intervals import show_intervals
 
 if TYPE_CHECKING:
-    from damageest_evaluate.case import DamageCase
     from damageest_evaluate.matrix import MatrixCell
 
 app = typer.Typer(no_args_is_help=True, help="Measure accuracy and cost against known truth.")
@@ -123,6 +121,7 @@ def job_command(
     from damageest.registry import Registry
     from damageest_evaluate.figures import summarise
     from damageest_evaluate.job import plan_study
+    from damageest_evaluate.report import format_row
     from damageest_evaluate.variants import VariationRequest
 
     prepare_places(out)
@@ -134,7 +133,7 @@ def job_command(
         study = plan_study(job, request, seeds, Registry.discover(), Path(folder))
         for note in study.notes:
             typer.echo(note, err=as_json)
-        rows = _run_cases(study.cases, jobs, timeout, out, scheduler)
+        rows = run_counted(study.cases, out, "cases.jsonl", jobs, timeout, format_row, scheduler)
     _write_report(rows, [], study.unit, out, plots, as_json)
     typer.echo(f"\n{summarise(rows, study.unit)}", err=as_json)
 
@@ -186,9 +185,10 @@ def suite_command(
     from damageest.registry import Registry
     from damageest_evaluate import suite
     from damageest_evaluate.figures import collect_axes, summarise
+    from damageest_evaluate.intervals import format_interval_row, make_interval_cases
     from damageest_evaluate.parts import PARTS
     from damageest_evaluate.readme import replace_between_marks
-    from damageest_evaluate.report import make_readme_tables
+    from damageest_evaluate.report import format_row, make_readme_tables
     from damageest_evaluate.variants import VariationRequest
 
     chosen = [name.strip() for name in parts.split(",")] if parts else list(PARTS)
@@ -197,8 +197,10 @@ def suite_command(
             raise InputError(
                 "--intervals: varies noise and density itself; leave out --vary, --against, --set, --noise and --points"
             )
-        run_intervals(cases, seed, chosen, jobs, timeout, out, write, marks, format_command(), scheduler,
-            as_json)  # fmt: skip
+        prepare_places(out, write, marks)
+        measured = make_interval_cases(cases, seed, chosen, Registry.discover())
+        rows = run_counted(measured, out, "intervals.jsonl", jobs, timeout, format_interval_row, scheduler)
+        show_intervals(rows, write, marks, as_json)
         return
     prepare_places(out, write, marks)
     if pose not in ("random", "identity"):
@@ -207,7 +209,7 @@ def suite_command(
     varied = [text for text in base if text.partition("=")[0] not in {name.partition("=")[0] for name in vary or ()}]
     request = VariationRequest(size, noise, points, tolerance, vary or (), [*varied, *(settings or ())], against or ())
     planned = suite.make_cases(cases, seed, chosen, pose, request, Registry.discover())
-    rows = _run_cases(planned, jobs, timeout, out, scheduler)
+    rows = run_counted(planned, out, "cases.jsonl", jobs, timeout, format_row, scheduler)
     first = ["part"] if len(chosen) > 1 or not collect_axes(rows) else []
     _write_report(rows, first, "mm", out, plots, as_json)
     typer.echo(f"\n{summarise(rows, 'mm')}", err=as_json)
@@ -218,22 +220,6 @@ def suite_command(
             ),
             encoding="utf-8",
         )
-
-
-def _run_cases(
-    cases: Sequence[DamageCase], jobs: int, timeout: float, out: Path | None, scheduler: str
-) -> list[dict[str, Any]]:
-    from damageest_evaluate.report import format_row
-    from damageest_evaluate.rows import run_all
-
-    count = 0
-
-    def print_row(row: dict[str, Any]) -> None:
-        nonlocal count
-        count += 1
-        typer.echo(f"[{count}/{len(cases)}] {format_row(row)}", err=True)
-
-    return run_all(cases, out / "cases.jsonl" if out else None, jobs, timeout, print_row, scheduler)
 
 
 def _write_report(
