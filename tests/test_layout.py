@@ -82,7 +82,9 @@ LEFT = {
     "damageest/stages/align/_fit_start.py fit_from_start",
 }
 """Functions that still have more. None may come to be here."""
-HEADER = re.compile(r"^([ \t]*(?:@.*\n[ \t]*)*)(?:async )?def (\w+)(\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))", re.MULTILINE)
+HEADER = re.compile(
+    r"^([ \t]*(?:@.*\n[ \t]*)*)(?:async )?def (\w+)(\((?:[^()]|\((?:[^()]|\([^()]*\))*\))*\))", re.MULTILINE
+)
 """Decorators, name and parameters of a function: whole files need not be parsed, which takes seconds for all."""
 
 

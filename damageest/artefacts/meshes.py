@@ -52,6 +52,11 @@ class Mesh(Checked):
         return np.asarray(self.cross / np.maximum(np.linalg.norm(self.cross, axis=1), 1e-300)[:, None])
 
     @cached_property
+    def face_areas(self) -> Floats:
+        """(F,) areas of the faces."""
+        return np.asarray(np.linalg.norm(self.cross, axis=1) / 2)
+
+    @cached_property
     def vertex_cross(self) -> Floats:
         """(V,3) sum of the faces' `cross` at each vertex: a normal weighted by area, of no unit length."""
         total = np.zeros_like(self.vertices)
@@ -67,7 +72,7 @@ class Mesh(Checked):
 
     @property
     def area(self) -> float:
-        return float(np.linalg.norm(self.cross, axis=1).sum() / 2)
+        return float(self.face_areas.sum())
 
     @cached_property
     def bounds(self) -> Floats:

@@ -67,7 +67,7 @@ def ask_beyond_points(
     if not len(own) or inner.all() or not inner.any():
         return BeyondPoints()
     volume = solid.volume
-    area = np.linalg.norm(solid.cross, axis=1) / 2
+    area = solid.face_areas
     skin = Mesh(solid.vertices, solid.faces[~inner])
     depth = float(distance_to_mesh(own[:: max(1, len(own) // MOST)], skin).max())
     behind, before, bare = _compare_with_points(

@@ -56,10 +56,10 @@ def weigh_evidence(damage: Solid, ids_points: Floats, field: ScanField) -> Evide
     bare = float((gaps > 1.5 * reach).mean()) if len(on_ids) else 0.0
     far = gaps > max(1.5 * tolerance, 1.6 * spacing)
     ids_unseen = float(far.mean()) if len(on_ids) else 0.0
-    ids_gap = _measure_largest_gap(on_ids, far, float(np.linalg.norm(damage.cross[inner], axis=1).sum() / 2), spacing)
+    ids_gap = _measure_largest_gap(on_ids, far, float(damage.face_areas[inner].sum()), spacing)
     # Close to the rim, intact points are near any skin. So only skin away from the inner surface is compared.
     intact = points[label == INTACT]
-    grain = float(np.sqrt(np.linalg.norm(damage.cross[~inner], axis=1).sum() / MOST))
+    grain = float(np.sqrt(2 * damage.face_areas[~inner].sum() / MOST))
     close = tolerance + 4 * grain
     intact = intact[_measure_gap(intact, on_skin, close) <= close]
     intact = intact[_measure_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
@@ -77,7 +77,7 @@ def weigh_evidence(damage: Solid, ids_points: Floats, field: ScanField) -> Evide
     unseen = _share_unseen(part, damage, inner, np.concatenate([points, covered]), on_skin, reach)
     over = _count_intact_over(damage, inner, field)
     # as many as on intact skin of this area, or as many as there are points of the site: either shows intact skin
-    skin_area = float(np.linalg.norm(damage.cross[~inner], axis=1).sum() / 2)
+    skin_area = float(damage.face_areas[~inner].sum())
     expected = min(len(ids_points) + over, skin_area * (1.1 / spacing) ** 2 if spacing else np.inf)
     intact_share = float(min(over / max(expected, 1.0), 1.0)) if over >= FEWEST_INTACT else 0.0
 
@@ -157,7 +157,7 @@ def _share_unseen(part: Part, damage: Solid, inner: Flags, points: Floats, on_sk
     near = np.ones(len(part.faces), bool)
     for along, least, most in zip(part.vertices.T, low, high, strict=True):
         near &= (along < most)[part.faces].any(axis=1) & (along > least)[part.faces].any(axis=1)
-    area = float(np.linalg.norm(part.cross[near], axis=1).sum() / 2)
+    area = float(part.face_areas[near].sum())
     if not area > 0:
         return 0.0
     count = int(np.clip(area / (0.7 * reach) ** 2, 1000, 2 * MOST))
@@ -175,6 +175,6 @@ def _share_unseen(part: Part, damage: Solid, inner: Flags, points: Floats, on_sk
 
 def _spread(mesh: Solid, chosen: Flags, count: int) -> Floats:
     """``count`` points spread evenly by area over the chosen faces; none where these have no area."""
-    if not (np.linalg.norm(mesh.cross[chosen], axis=1).sum() > 0):
+    if not (mesh.face_areas[chosen].sum() > 0):
         return np.empty((0, 3))
     return sample_by_area(mesh, count, np.random.default_rng(0), np.flatnonzero(chosen))[0]

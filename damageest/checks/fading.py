@@ -47,7 +47,7 @@ def measure_fading(
         systematic: how far intact skin deviates over whole areas: less is no loss.
         others: gives the cells (C,) of the skin that other sites remove; it is called for a shallow loss only.
     """
-    on_skin = np.flatnonzero(~inner & (np.linalg.norm(damage.cross, axis=1) > 0))
+    on_skin = np.flatnonzero(~inner & (damage.face_areas > 0))
     if not len(on_skin) or not inner.any():
         return None
     places, _ = sample_by_area(damage, SAMPLES, np.random.default_rng(0), on_skin)

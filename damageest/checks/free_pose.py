@@ -81,7 +81,7 @@ def compare_other_poses(damage: Solid, part: Part, pose: Pose, tolerance: float)
     """
     if pose.alternatives is None or not len(pose.alternatives):
         return 0.0
-    on_skin = np.flatnonzero(~find_inner_faces(damage, part) & (np.linalg.norm(damage.cross, axis=1) > 0))
+    on_skin = np.flatnonzero(~find_inner_faces(damage, part) & (damage.face_areas > 0))
     if not len(on_skin):
         return 0.0
     places = sample_by_area(damage, SAMPLES, np.random.default_rng(0), on_skin)[0]

@@ -56,7 +56,7 @@ def measure_inner_surface(
         inner: (F,) which faces of ``damage`` are on the inner surface, as `find_inner_faces` gives them.
         points: (M,3) the scan points of the site, in the part's frame. noise, spacing: of the scan.
     """
-    area = np.linalg.norm(damage.cross, axis=1) / 2
+    area = damage.face_areas
     total = float(area[inner].sum())
     if not len(points) or total <= 0 or spacing <= 0:
         return None

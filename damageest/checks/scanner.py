@@ -91,7 +91,7 @@ def find_shares(
     An offset d of the surface toward the outside makes the volume smaller by d times the inner area; a scale s about a
     centre c moves the inner surface by s (x - c). What the fit of the pose answers is undone.
     """
-    area = np.linalg.norm(damage.cross, axis=1) / 2
+    area = damage.face_areas
     centres, normals = damage.triangles.mean(axis=1) - pose.centre, damage.face_normals
     flux = np.einsum("ij,ij->i", centres, normals) * area
     place, outward = deepest[0] - pose.centre, deepest[1]

@@ -52,7 +52,7 @@ class SkinCells:
     @cached_property
     def areas(self) -> Floats:
         """(F,) the areas of the cells."""
-        return np.asarray(np.linalg.norm(self.mesh.cross, axis=1) / 2)
+        return self.mesh.face_areas
 
     @property
     def normals(self) -> Floats:

@@ -140,7 +140,7 @@ def close_surplus(
     if float(np.quantile(distance_to_mesh(points, solid), 0.95)) > 3 * tolerance + aligned.spacing:
         return None
     outer = find_inner_faces(solid, part)
-    area = np.linalg.norm(solid.cross, axis=1) / 2
+    area = solid.face_areas
     notes = (*surplus.notes, *([beyond.reason] if beyond.reason else []))
     if outer.any():
         places = sample_by_area(solid, 4000, np.random.default_rng(0), np.flatnonzero(outer))[0]

@@ -103,7 +103,7 @@ def measure_site_error(
     surface = measure_inner_surface(damage, inner, points, aligned.noise, aligned.spacing, tolerance)
     if surface is None or inner.all():
         return None
-    area = np.linalg.norm(damage.cross, axis=1) / 2
+    area = damage.face_areas
     skin = ~inner
     skin_area = float(area[skin].sum())
     # what deviates moves the inner surface against the skin: of a wall that broke off, the root alone
@@ -219,7 +219,7 @@ def measure_lowered(adapted: AdaptedPart | None, damage: Solid, reach: float) ->
     if not len(some):
         return 0.0
     own = some[distance_to_mesh(centres, damage) < reach]
-    return float(depth[own] @ np.linalg.norm(part.cross[own], axis=1)) / 2
+    return float(depth[own] @ part.face_areas[own])
 
 
 def _limit_outward(scan: ScanFacts, skin_area: float) -> float:

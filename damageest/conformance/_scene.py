@@ -152,7 +152,7 @@ def make_dent(number: int) -> Solid:
 
 def sample_points(mesh: Mesh, count: int, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Random points (N,3) on a mesh, uniform by area, and their normals (N,3)."""
-    area = np.linalg.norm(mesh.cross, axis=1)
+    area = 2 * mesh.face_areas
     face = rng.choice(len(area), count, p=area / area.sum())
     u, v = np.sqrt(rng.random((count, 1))), rng.random((count, 1))
     a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)

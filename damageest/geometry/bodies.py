@@ -61,7 +61,7 @@ def _take_body(vertices: Floats, faces: Ints, diagonal: float) -> Solid | None:
         body = Solid(vertices, faces)
     except ArtefactError:
         return None
-    area = float(np.linalg.norm(body.cross, axis=1).sum()) / 2
+    area = body.area
     return body if 2 * body.volume > ROUNDING * diagonal * area else None
 
 

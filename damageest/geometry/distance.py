@@ -241,7 +241,7 @@ def _find_flat(mesh: Mesh, scale: float) -> Flags:
     """Whether the height of each triangle over its longest edge (F,) is below what float64 coordinates resolve."""
     triangles = mesh.triangles
     longest = measure_longest_edges(triangles)
-    result: Flags = np.linalg.norm(mesh.cross, axis=1) <= 1e-10 * scale * np.maximum(longest, 1e-10 * scale)
+    result: Flags = 2 * mesh.face_areas <= 1e-10 * scale * np.maximum(longest, 1e-10 * scale)
     return result
 
 

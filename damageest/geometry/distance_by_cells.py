@@ -105,7 +105,7 @@ def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
     order = order_integers(code)
     start = np.flatnonzero(np.diff(code[order], prepend=-1))
     pair = np.diff(start, append=len(order)) == 2
-    length = np.linalg.norm(part.cross, axis=1)
+    length = 2 * part.face_areas
     normal = part.cross / np.maximum(length, 1e-300)[:, None]
     one, other = order[start[pair]], order[start[pair] + 1]
     turn = np.linalg.norm(normal[one // 3] - normal[other // 3], axis=1)

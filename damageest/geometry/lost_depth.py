@@ -57,7 +57,7 @@ class LostDepth:
         """From a damage volume, in the part's unit and frame. ``inner`` (F,): which of its faces lie inside the part,
         where that is known."""
         inner = find_inner_faces(damage, part) if inner is None else inner
-        skin = np.flatnonzero(~inner & (np.linalg.norm(damage.cross, axis=1) > 0))
+        skin = np.flatnonzero(~inner & (damage.face_areas > 0))
         lost, middle = Mesh(damage.vertices, damage.faces[skin]), damage.bounds.mean(axis=0)
         if not len(skin):
             none = np.empty((0, 3))

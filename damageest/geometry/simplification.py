@@ -44,7 +44,7 @@ def simplify_within(solid: Solid, detail: float) -> Solid:
 def _simplify_shell(body: Solid, detail: float) -> Solid:
     """One shell simplified as far as the limits allow; the same where no attempt keeps them."""
     body = _remove_flakes(body, detail)
-    area = np.linalg.norm(body.cross, axis=1)
+    area = 2 * body.face_areas
     origin = body.bounds.mean(0)
     for share in _SHARES:
         try:

@@ -100,7 +100,7 @@ def find_cubes_near(part: Mesh, places: Floats, feet: Floats, intact: Floats, ed
 def _spread_area(part: Mesh, step: float) -> tuple[Floats, Floats]:
     """Points (N,3) on the part, with gaps up to ``step`` on large triangles, and the area (N,) each stands for."""
     triangles = part.triangles
-    area = np.linalg.norm(part.cross, axis=1) / 2
+    area = part.face_areas
     longest = measure_longest_edges(triangles)
     is_large = (longest > step) & (area > 0)
     points, face = spread_points(triangles, np.flatnonzero(is_large), step)

@@ -31,7 +31,7 @@ def spread_on_faces(mesh: Mesh, spacing: float) -> tuple[Floats, Ints]:
     if not len(mesh.faces):
         return np.empty((0, 3)), np.empty(0, np.int64)
     triangles = mesh.triangles
-    double_area = np.linalg.norm(mesh.cross, axis=1)
+    double_area = 2 * mesh.face_areas
     longest = measure_longest_edges(triangles)
     usable = double_area > 1e-12 * mesh.diagonal * longest
     # One grid per triangle wastes points on small or thin triangles: these share one thinned set of points.

@@ -103,7 +103,7 @@ def _sample_skin(target: Mesh, body: Solid, near: float, defect: float) -> Skin 
     if not len(face):
         return None
     mesh = Mesh(corners.reshape(-1, 3), np.arange(3 * len(face)).reshape(-1, 3))
-    whole = float(np.linalg.norm(mesh.cross, axis=1).sum()) / 2
+    whole = mesh.area
     if not whole > 0:
         return None
     count = int(np.clip(SAMPLES * whole / defect**2, FEWEST, MOST))

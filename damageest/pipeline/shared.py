@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from damageest.artefacts import Part, Reason, Scan
 from damageest.checks.shared_skin import find_unshared
 from damageest.errors import StageError
@@ -28,7 +26,7 @@ def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: s
         raise StageError(
             "the two scans have no skin in common in the pose found", "scan sides that the earlier scan shows as well"
         )
-    area = float(np.linalg.norm(part.cross[~part.unseen], axis=1).sum() / 2)
+    area = float(part.face_areas[~part.unseen].sum())
     text = (
         f"the earlier scan shows {area:.4g} {unit}² of skin, and the result holds there alone; {1 - kept.mean():.0%} "
         "of the later scan's points show other skin and were removed"

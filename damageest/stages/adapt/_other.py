@@ -44,7 +44,7 @@ def find_thinned(skin: Mesh, field: Field, other: Field, tolerance: float) -> Th
     """Where the other field has the ``skin`` deeper in the part than the field."""
     centres = skin.triangles.mean(axis=1)
     depth = -np.einsum("ij,ij->i", other.displace(centres) - field.displace(centres), skin.face_normals)
-    area = np.linalg.norm(skin.cross, axis=1) / 2
+    area = skin.face_areas
     deep = depth > TOLD * tolerance
     return Thinned(float(depth.max(initial=0.0)), float(area[deep].sum()), float((area * depth)[deep].sum()))
 

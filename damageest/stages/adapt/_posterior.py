@@ -98,7 +98,7 @@ def go_beyond(places: Floats, seen: Floats, spacing: float) -> Floats:
 
 def find_spacing(body: Body, points: Floats) -> float:
     """How far skin may be from a point between points, where all of it is seen."""
-    area = float(np.linalg.norm(body.mesh.cross, axis=1).sum()) / 2
+    area = body.mesh.area
     return 2 * float(np.sqrt(area / max(len(points), 1)))
 
 

@@ -23,7 +23,7 @@ def describe_cut_through(damage: Solid, cavity: Solid, part: Part, tolerance: fl
     piece = label_pieces(cavity.faces[outer])
     middle = cavity.triangles[outer].mean(axis=1)
     beside = distance_to_mesh(middle, Mesh(damage.vertices, lost)) <= tolerance
-    area = np.linalg.norm(cavity.cross[outer], axis=1) / 2
+    area = cavity.face_areas[outer]
     told = []
     for number in np.unique(piece):
         own = piece == number

@@ -127,7 +127,7 @@ def _find_unseen(mesh: Mesh, cloud: Floats, normals: Floats, spacing: float) -> 
     radius = find_neighbours(cloud[near], NEIGHBOURS, cloud)[0][:, -1][at]
     agree = np.einsum("ij,ij->i", mesh.face_normals, normals[nearest])
     bare = (gap > NEAR * np.minimum(radius, 3 * np.median(radius))) | ((agree < AGREES) & (gap > 0.5 * radius))
-    area = np.linalg.norm(mesh.cross, axis=1) / 2
+    area = mesh.face_areas
     piece = _label_pieces(mesh, bare)
     size = np.bincount(piece[bare], area[bare], minlength=len(middle)) if bare.any() else np.zeros(len(middle))
     bare &= size[np.maximum(piece, 0)] > SPOT * spacing**2

@@ -146,7 +146,7 @@ def name_faces(part: Part, damage: Mesh, tolerance: float) -> str:
         return ""
     near = closest_on_mesh(damage.triangles.mean(axis=1), part)
     aligned = np.abs(np.einsum("ij,ij->i", damage.face_normals, part.face_normals[near.face])) > 0.99
-    area = np.linalg.norm(damage.cross, axis=1) / 2
+    area = damage.face_areas
     taken = (near.distance < 0.1 * tolerance) & aligned
     number = part.faces_brep[near.face[taken]]
     total = np.bincount(number, weights=area[taken])

@@ -140,7 +140,7 @@ def sample_seen(
     ``spare``: how many points to draw for each that is kept, where they are weighted. Raises StageError where the
     scanner sees nothing.
     """
-    area = np.linalg.norm(mesh.cross, axis=1) * faces
+    area = 2 * mesh.face_areas * faces
     if not area.any():
         raise make_unseen_error()
     if weigh is None:

@@ -49,7 +49,7 @@ def list_tools(cut: Cut, part: Part, tolerance: float) -> Iterator[Attempt]:
             make = partial(build_shapes, inner, found.shapes, found.nearest, tolerance, beyond * tolerance)
             yield Attempt(f"shapes {beyond:g}", make, (1e-6,))
     flat = [k for k, shape in enumerate(found.shapes) if shape.kind == "plane"]
-    area = np.linalg.norm(inner.cross, axis=1)
+    area = 2 * inner.face_areas
     share = area[np.isin(found.label, flat)].sum() / area.sum()
     if share < MOSTLY:
         yield from _list_splines(inner, part, tolerance)

@@ -200,7 +200,7 @@ def _sample_above(mesh: Mesh, part: Part, tolerance: float) -> tuple[Floats, Flo
     the CAD faces that these are on."""
     assert part.faces_brep is not None
     rng = np.random.default_rng(31)
-    total = np.cumsum(np.linalg.norm(mesh.cross, axis=1))
+    total = np.cumsum(2 * mesh.face_areas)
     face = np.minimum(np.searchsorted(total, rng.random(SAMPLES) * total[-1], side="right"), len(total) - 1)
     u, v = np.sqrt(rng.random((SAMPLES, 1))), rng.random((SAMPLES, 1))
     a, b, c = np.moveaxis(mesh.triangles[face], 1, 0)

@@ -75,7 +75,7 @@ def _join_needles(mesh: Mesh, region: Ints) -> Ints:
     """The regions, where one without area is joined to its neighbour over its longest edge."""
     start, end = mesh.faces.ravel(), np.roll(mesh.faces, -1, axis=1).ravel()
     length = np.linalg.norm(mesh.vertices[end] - mesh.vertices[start], axis=1)
-    thick = np.linalg.norm(mesh.cross, axis=1) > FLAT * mesh.diagonal * length.reshape(-1, 3).max(axis=1)
+    thick = 2 * mesh.face_areas > FLAT * mesh.diagonal * length.reshape(-1, 3).max(axis=1)
     size = len(mesh.vertices)
     code = start * size + end
     order = np.argsort(code)
@@ -106,7 +106,7 @@ def _find_pinched(mesh: Mesh, region: Ints, loops: list[Ints], owners: Ints) -> 
         one, two = find_neighbours(mesh.faces[rows])
         graph = coo_array((np.ones(len(one), bool), (one, two)), shape=(len(rows),) * 2)
         fan = connected_components(graph, directed=False)[1]
-        area = np.bincount(fan, weights=np.linalg.norm(mesh.cross[rows], axis=1))
+        area = np.bincount(fan, weights=2 * mesh.face_areas[rows])
         lone[rows[fan != area.argmax()] if len(area) > 1 else rows] = True
     return lone
 

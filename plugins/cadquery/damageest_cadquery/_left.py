@@ -47,9 +47,7 @@ def cut_facets(rest: Sequence[Piece], damage: Solid, part: Part, tolerance: floa
         left = to_solid(whole - cutter, origin)
         bodies = [] if left is None else [body for body in split_bodies(left) if body.volume > SPECK * damage.volume]
         kept = sum(body.volume for body in bodies)
-        room = VOLUME * whole.volume() + (chord + part.tessellation_error) * float(
-            np.linalg.norm(damage.cross, axis=1).sum()
-        )
+        room = VOLUME * whole.volume() + (chord + part.tessellation_error) * 2 * damage.area
         if abs(whole.volume() - common - kept) > room:
             return None
         pieces += [_build(body, piece) for body in bodies]

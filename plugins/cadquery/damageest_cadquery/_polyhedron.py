@@ -116,7 +116,7 @@ def shift_free(flat: Flat, step: float) -> Flat:
     stay: on average it is moved by that."""
     mesh = flat.mesh
     free = np.asarray(~_find_bounds(mesh.faces, flat.label, len(flat.planes), len(mesh.vertices)).any(axis=1))
-    areas = np.linalg.norm(mesh.cross, axis=1)
+    areas = 2 * mesh.face_areas
     share = float(areas @ free[mesh.faces].mean(axis=1)) / max(float(areas.sum()), 1e-300)
     step /= max(share, LEAST_FREE)
     return Flat(Mesh(mesh.vertices + step * free[:, None] * mesh.vertex_normals, mesh.faces), flat.label, flat.planes)
@@ -128,7 +128,7 @@ def _settle(flat: Flat, tolerance: float) -> Flat:
     faces, label = flat.mesh.faces, flat.label
     if not len(flat.planes):
         return flat
-    area = np.linalg.norm(flat.mesh.cross, axis=1)
+    area = 2 * flat.mesh.face_areas
     for _ in range(12):
         bounds = _find_bounds(faces, label, len(flat.planes), len(flat.mesh.vertices))
         moved = _project(flat.mesh.vertices, bounds, flat.planes)

@@ -61,7 +61,7 @@ def recognise(mesh: Mesh, close: float, left: float = 0.0, seed: int = 1) -> tup
     It ends early where further shapes of the last one's size would leave more than a share ``left`` of the surface, and
     none of them is large: such a surface is not made of them.
     """
-    samples = _Samples(mesh.triangles.mean(1), mesh.face_normals, np.linalg.norm(mesh.cross, axis=1), _link(mesh.faces))
+    samples = _Samples(mesh.triangles.mean(1), mesh.face_normals, 2 * mesh.face_areas, _link(mesh.faces))
     rng = np.random.default_rng(seed)
     label = np.full(len(mesh.faces), -1, np.int64)
     shapes: list[Shape] = []

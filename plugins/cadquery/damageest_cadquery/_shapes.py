@@ -39,7 +39,7 @@ class Found:
 def find_shapes(inner: Mesh, tolerance: float) -> Found:
     """The shapes that a surface is made of, wholly or in part."""
     shapes, label = recognise(inner, tolerance / 5, LEFT)
-    area = np.linalg.norm(inner.cross, axis=1)
+    area = 2 * inner.face_areas
     area /= area.sum()
     sizes = np.array([area[label == k].sum() for k in range(len(shapes))])
     # slivers of the roundings at edges and rims are recognised too: what a larger shape explains almost as well goes

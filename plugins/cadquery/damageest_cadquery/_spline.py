@@ -71,9 +71,9 @@ def drop_tails(inner: Mesh, width: float) -> Mesh:
 def find_charts(inner: Mesh, how: Way, part: Part, tolerance: float) -> list[Chart] | None:
     """Each connected piece of a surface spread over a plane: as seen from one side, or over a disk, also where it
     overhangs. None where one cannot be."""
-    charts, whole = [], np.linalg.norm(inner.cross, axis=1).sum()
+    charts, whole = [], 2 * inner.area
     for piece in split_mesh(_drop_pinches(inner)):
-        area = np.linalg.norm(piece.cross, axis=1).sum()
+        area = 2 * piece.area
         if area < BIT * whole:
             continue
         if how == "seen":

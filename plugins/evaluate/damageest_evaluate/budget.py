@@ -215,7 +215,7 @@ def make_scene(name: str, rng: np.random.Generator | None = None) -> Scene:
 
 def _sample(mesh: Solid, rng: np.random.Generator) -> tuple[Floats, Floats]:
     """Points (N,3) that are uniform by area, and the outward normals there."""
-    area = np.linalg.norm(mesh.cross, axis=1)
+    area = 2 * mesh.face_areas
     face = rng.choice(len(area), POINTS, p=area / area.sum())
     first, second = np.sqrt(rng.random(POINTS)), rng.random(POINTS)
     weights = np.stack([1 - first, first * (1 - second), first * second], axis=1)

@@ -46,7 +46,7 @@ def find_open_normal(deposit: Mesh, metal: Mesh | None, tolerance: float) -> Flo
 
     ``tolerance``: faces nearer to the metal than that lie on it.
     """
-    centre, area = deposit.triangles.mean(axis=1), np.linalg.norm(deposit.cross, axis=1)
+    centre, area = deposit.triangles.mean(axis=1), 2 * deposit.face_areas
     is_open = np.ones(len(centre), bool) if metal is None else distance_to_mesh(centre, metal) > tolerance
     total = deposit.cross[is_open].sum(axis=0)
     if np.linalg.norm(total) <= 1e-6 * area.sum():
@@ -62,7 +62,7 @@ def list_directions(deposit: Mesh, metal: Mesh | None, tolerance: float) -> list
     is_open = np.ones(len(centre), bool) if metal is None else distance_to_mesh(centre, metal) > tolerance
     rounded = np.round(deposit.face_normals, 2)
     kinds, number = np.unique(rounded[is_open], axis=0, return_inverse=True)
-    area = np.bincount(number.ravel(), weights=np.linalg.norm(deposit.cross[is_open], axis=1), minlength=len(kinds))
+    area = np.bincount(number.ravel(), weights=2 * deposit.face_areas[is_open], minlength=len(kinds))
     planes = [kinds[k] for k in np.argsort(-area, kind="stable")[:3] if np.linalg.norm(kinds[k]) > 0.5]
     axes = sorted((sign * row for row in np.eye(3) for sign in (1.0, -1.0)), key=lambda axis: -float(axis @ main))
     found: list[Floats] = []

@@ -98,7 +98,7 @@ def list_floors(body: Any, metal: Any, process: Process) -> Iterator[tuple[Floor
     width = process.bead.width
     vertices, faces = to_arrays(body.refine_to_length(EDGE * width))
     mesh = Mesh(vertices, faces)
-    area = np.linalg.norm(mesh.cross, axis=1) / 2
+    area = mesh.face_areas
     sound = area > 1e-12 * width**2
     on_metal, standing = np.zeros(len(faces), bool), Mesh(*to_arrays(metal))
     middle, deep = mesh.triangles.mean(axis=1), PROBE * min(width, process.height)

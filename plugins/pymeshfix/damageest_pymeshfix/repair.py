@@ -108,6 +108,6 @@ def _combine_shells(done: list[Solid], unclear: list[Mesh]) -> Solid:
 
 def _measure_share_off(mesh: Mesh, other: Mesh, tolerance: float) -> float:
     """Share of the area of ``mesh`` farther than ``tolerance`` from ``other``."""
-    area = np.linalg.norm(mesh.cross, axis=1)
+    area = 2 * mesh.face_areas
     distance = distance_to_mesh(mesh.triangles.mean(axis=1), other)
     return float(area[distance > tolerance].sum() / max(area.sum(), 1e-300))

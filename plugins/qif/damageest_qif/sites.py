@@ -135,7 +135,7 @@ class Lost(NamedTuple):
 
 def find_lost(result: Result, site: Site) -> Lost:
     lost = np.flatnonzero(~find_inner_faces(site.damage, result.part))
-    area = float(np.linalg.norm(site.damage.cross[lost], axis=1).sum() / 2)
+    area = float(site.damage.face_areas[lost].sum())
     if result.part.faces_brep is None or not len(lost):
         return Lost(area, [])
     face = closest_on_mesh(site.damage.triangles[lost].mean(axis=1), result.part).face

@@ -93,7 +93,7 @@ def orient_to_skin(surface: Surface, rim: Ints, part: Part) -> tuple[Ints, Ints,
 
 def measure_steep_share(mesh: Mesh, direction: Floats, limit: float) -> float:
     """Share of a mesh's area whose normals are more than ``limit`` degrees from ``direction`` (3,)."""
-    size = np.linalg.norm(mesh.cross, axis=1)
+    size = 2 * mesh.face_areas
     return float(size[mesh.cross @ direction < np.cos(np.deg2rad(limit)) * size].sum() / size.sum())
 
 

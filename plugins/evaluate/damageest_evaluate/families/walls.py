@@ -217,7 +217,7 @@ def draw_wall(seed: int) -> Draw:
     scanners = _place_scanners(wall, side, part.diagonal, rng)
     trial, face = sample_by_area(left, 20_000, rng)
     seen = find_visible(RayCaster(left), left, trial, normalise(left.cross[face]), scanners).any(axis=1).mean()
-    area = float(np.linalg.norm(left.cross, axis=1).sum() / 2) * float(seen)
+    area = left.area * float(seen)
     count = int(np.clip(area / spacing**2, 400, MOST_POINTS))
     noise = 0.05 * spacing
     points, view = scan_surface(left, scanners, count, rng)

@@ -133,7 +133,7 @@ def make_worn(kind: str, seed: int) -> Worn:
     depth = rng.uniform(*DEPTHS) * wear(fine.vertices)
     lost = np.linalg.norm(depth, axis=1)
     worn = fine.vertices + shape + depth
-    area = np.linalg.norm(fine.cross, axis=1) / 2
+    area = fine.face_areas
     of_face = lost[fine.faces].mean(axis=1)
     points = sample(worn, fine.faces, POINTS, seed).places
     turn = Rotation.random(random_state=np.random.default_rng([692, seed])).as_matrix()
