@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh, Part, Solid
-from damageest.checks.inner_surface import pair_faces
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.edges import pair_faces
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import find_inner_faces

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Solid
+from damageest.artefacts import Flags, Floats, Solid
+from damageest.geometry.edges import pair_faces
 from damageest.geometry.voxels import number_cubes
 
 CUBE = 5.0
@@ -101,13 +102,3 @@ def _measure_edges(damage: Solid, inner: Flags) -> tuple[float, float]:
     sine = np.einsum("ij,ij->i", np.cross(a, b), along[within]) / np.maximum(length[within], 1e-300)
     angle = np.arctan2(sine, np.einsum("ij,ij->i", a, b))
     return float(length[rim].sum()), float(length[within] @ angle)
-
-
-def pair_faces(faces: Ints) -> tuple[Ints, Ints, Ints, Ints]:
-    """For each edge (E,) of a closed mesh: its ends, and the two faces at it; it runs from the first to the second end
-    in the first face."""
-    edges = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    low, high = edges.min(axis=1), edges.max(axis=1)
-    order = np.argsort(low * (int(faces.max()) + 1) + high, kind="stable")
-    one, other = order[0::2], order[1::2]
-    return edges[one, 0], edges[one, 1], one // 3, other // 3

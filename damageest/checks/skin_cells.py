@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import ADDED, INTACT, Flags, Floats, Ints, Mesh, Part, Scan
+from damageest.geometry.edges import list_edges
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
 from damageest.geometry.refinement import cut_into_cells
 from damageest.geometry.scan_field import ScanField
@@ -62,7 +63,7 @@ class SkinCells:
     @cached_property
     def neighbours(self) -> Ints:
         """(K,2) pairs of cells that share an edge."""
-        edges = np.sort(self.mesh.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+        edges = list_edges(self.mesh.faces)
         code = edges[:, 0] * len(self.mesh.vertices) + edges[:, 1]
         order = np.argsort(code, kind="stable")
         same = np.flatnonzero(np.diff(code[order]) == 0)

@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Mesh, Part, Scan, Solid
 from damageest.checks.beyond_points import BeyondPoints
-from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface, pair_faces
+from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scanner import ScannerErrors, find_shares
 from damageest.checks.site_error import WIDTH, SiteError
@@ -18,6 +18,7 @@ from damageest.checks.unseen_rim import find_unseen_beside
 from damageest.findings import Coverage
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.edges import pair_faces
 from damageest.geometry.lost_depth import LostDepth
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.geometry.sampling import sample_by_area

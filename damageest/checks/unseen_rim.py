@@ -9,9 +9,9 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
-from damageest.checks.inner_surface import pair_faces
 from damageest.findings import Coverage
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.edges import pair_faces
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.skin import find_inner_faces
 

@@ -11,6 +11,7 @@ from damageest.artefacts import Floats, Rims, Solid, Surface, open_edges
 from damageest.conformance import _scene
 from damageest.conformance._base import PlacementContract, check_or_refused, undo_placement
 from damageest.geometry.distance import is_inside
+from damageest.geometry.edges import list_edges
 
 EMPTY = Surface(np.empty((0, 3)), np.empty((0, 3), int))
 
@@ -35,7 +36,7 @@ class ReconstructContract(PlacementContract):
     def check_usable(self, surface: Surface) -> None:
         """Asserts that the surface is open and that at most two triangles share an edge."""
         assert open_edges(surface.faces), "the surface must have a boundary"
-        edges = np.sort(surface.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+        edges = list_edges(surface.faces)
         assert np.unique(edges, axis=0, return_counts=True)[1].max() <= 2, "more than two triangles share an edge"
 
     def test_follows_the_dent(self) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.duplicates import order_integers
+from damageest.geometry.edges import list_edges
 from damageest.geometry.sampling import place_along
 from damageest.geometry.vectors import normalise
 from damageest.geometry.voxels import CHUNK, MOST_ALONG, VoxelGrid
@@ -100,7 +101,7 @@ def signed_distance_by_cells(points: Floats, part: Mesh, near: float, exact: Exa
 def _find_creases(part: Mesh, slope: float) -> tuple[Ints, Ints]:
     """Edges (E,2) that are sharp or do not belong to exactly two faces, and edges (E,2) where the surface bends by more
     than a thousandth of ``slope`` (radians) but is not sharp."""
-    edges = np.sort(part.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = list_edges(part.faces)
     code = edges[:, 0] * len(part.vertices) + edges[:, 1]
     order = order_integers(code)
     start = np.flatnonzero(np.diff(code[order], prepend=-1))

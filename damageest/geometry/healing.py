@@ -9,6 +9,7 @@ from damageest.artefacts import Floats, Ints, open_edges
 from damageest.errors import InputError
 from damageest.geometry.body_repair import label_bodies, orient_faces, resolve_bodies, split_pinches
 from damageest.geometry.duplicates import find_duplicates, list_used
+from damageest.geometry.vectors import cross_corners
 
 _HOLE_EDGES = 12
 """Edges of a hole up to which it may be closed."""
@@ -186,7 +187,7 @@ def _trace_hole_loops(faces: Ints) -> list[Ints]:
 def _fill_holes(vertices: Floats, faces: Ints, notes: list[str]) -> Ints:
     """Closes holes that a few missing triangles leave: of three edges, or of up to 12 and 1 % of the surface area."""
     corners = vertices[faces]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
+    area = np.linalg.norm(cross_corners(corners), axis=1).sum() / 2
     patches: list[Ints] = []
     for loop in _trace_hole_loops(faces):
         if len(loop) > _HOLE_EDGES:

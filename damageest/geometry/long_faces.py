@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.vectors import measure_longest_edges
+from damageest.geometry.vectors import cross_corners, measure_longest_edges
 
 Tree = tuple[Any, Floats, Ints, Ints]
 """libigl's tree of boxes, vertices (V,3) and the pieces (P,3) that it holds, and the triangle (P,) of each piece."""
@@ -67,7 +67,7 @@ def _measure_looseness(corners: Floats) -> float:
     x, y, z = (
         np.maximum(np.maximum(a, b), c) - np.minimum(np.minimum(a, b), c) for a, b, c in corners.transpose(2, 1, 0)
     )
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = cross_corners(corners)
     return float((x * y + y * z + z * x).sum() / max(float(np.linalg.norm(cross, axis=1).sum() / 2), 1e-300))
 
 

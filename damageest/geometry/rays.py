@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.vectors import cross_corners
 from damageest.isolation.memory import require_memory
 
 BYTES_OF_TRIANGLE = 150
@@ -130,7 +131,7 @@ class _Tree:
         import igl
 
         self._vertices, self._faces = triangles.reshape(-1, 3), np.arange(3 * len(triangles)).reshape(-1, 3)
-        self._across = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+        self._across = cross_corners(triangles)
         self._tree = igl.AABB()
         if len(triangles):
             self._tree.init(self._vertices, self._faces)

@@ -13,7 +13,8 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.duplicates import find_members, group_integers
-from damageest.geometry.vectors import measure_longest_edges
+from damageest.geometry.edges import list_edges
+from damageest.geometry.vectors import cross_corners, measure_longest_edges
 from damageest.isolation.memory import require_memory
 
 BYTES_OF_FACE = 250
@@ -79,7 +80,7 @@ def cut_into_cells(mesh: Mesh, edge: float, area: float = 0.0) -> tuple[Mesh, In
         corners = vertices[faces[asked]]
         long = measure_longest_edges(corners) > edge
         if area:
-            cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+            cross = cross_corners(corners)
             long &= np.linalg.norm(cross, axis=1) > 2 * area
         if not long.any():
             break
@@ -155,7 +156,7 @@ def _halve_some(vertices: Floats, faces: Ints, wanted: Ints) -> _Halves:
     length = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
     longest = length.argmax(axis=1)
     faces = faces[np.arange(len(faces))[:, None], (longest[:, None] + np.arange(3)) % 3]
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2), axis=2)
+    ends = list_edges(faces).reshape(-1, 3, 2)
     edge = group_integers((ends[..., 0] * len(vertices) + ends[..., 1]).ravel())[1].reshape(-1, 3)
     marked = np.zeros(int(edge.max()) + 1, dtype=bool)
     marked[edge[wanted, 0]] = True

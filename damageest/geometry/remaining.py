@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
+from damageest.geometry.edges import list_edges
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import BALANCE, subtract_lost, to_manifold, to_solid, unite
 from damageest.geometry.vectors import normalise
@@ -91,7 +92,7 @@ def _average(faces: Ints, normals: Floats, count: int) -> Floats:
 def _find_middles(vertices: Floats, faces: Ints, normals: Floats, height: float) -> tuple[Floats, Ints]:
     """The middles (M,3), moved out, of edges that two of the faces (F,3) share, and which of them each edge of a face
     has (F,3), -1 for none."""
-    edges = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    edges = list_edges(faces)
     pairs, number, count = np.unique(edges, axis=0, return_inverse=True, return_counts=True)
     number = number.reshape(-1)
     shared = count == 2

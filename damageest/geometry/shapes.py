@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import cross_corners, normalise
 
 Kind = Literal["plane", "cylinder", "cone", "sphere"]
 
@@ -89,7 +89,7 @@ def recognise_shape(triangles: Floats, deviation: float = 0.0) -> Shape | None:
 
     ``deviation``: further permitted distance of corners.
     """
-    cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    cross = cross_corners(triangles)
     area = np.linalg.norm(cross, axis=1)
     if not len(area) or not area.sum() > 0:
         return None

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
+from damageest.geometry.vectors import cross_corners
 
 TRIALS = 400
 """Planes through three points that are tried."""
@@ -40,7 +41,7 @@ def find_table(points: Floats, near: float) -> Table | None:
     if len(some) < 100:
         return None
     corners = some[rng.integers(0, len(some), (TRIALS, 3))]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals = cross_corners(corners)
     size = np.linalg.norm(normals, axis=1)
     normals, corners = normals[size > 0] / size[size > 0, None], corners[size > 0]
     heights = some @ normals.T - np.einsum("ij,ij->i", normals, corners[:, 0])

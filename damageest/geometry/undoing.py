@@ -8,9 +8,10 @@ from collections.abc import Callable
 import numpy as np
 
 from damageest.artefacts import DisplacementField, Floats, Ints, Mesh
+from damageest.geometry.edges import list_edges
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.refinement import bisect_faces
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import cross_corners, normalise
 
 MARGIN = 0.25
 """How far beyond its box a field goes on, as a share of the box's sides; farther away, each place is displaced as the
@@ -65,7 +66,7 @@ def cut_to_follow(mesh: Mesh, move: Callable[[Floats], Floats], within: float) -
 
 def _measure_off(vertices: Floats, moved: Floats, faces: Ints, move: Callable[[Floats], Floats]) -> Floats:
     """(F,) how far the moved triangles lie off at most."""
-    ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    ends = list_edges(faces)
     edges, row = np.unique(ends, axis=0, return_inverse=True)
     middle = move(vertices[edges].mean(axis=1)) - moved[edges].mean(axis=1)
     inside = move(vertices[faces].mean(axis=1)) - moved[faces].mean(axis=1)
@@ -83,13 +84,13 @@ def find_crossings(mesh: Mesh) -> tuple[Ints, Ints]:
     """(N,2) the edges of a mesh and (N,) the faces that they cross, as `count_crossings` counts them."""
     if not len(mesh.faces):
         return np.empty((0, 2), np.int64), np.empty(0, np.int64)
-    ends = np.sort(np.stack([mesh.faces, np.roll(mesh.faces, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+    ends = list_edges(mesh.faces)
     edges = np.unique(ends, axis=0)
     found = RayCaster(mesh).find_crossings(mesh.vertices[edges[:, 0]], mesh.vertices[edges[:, 1]])
     own, corners = edges[found.ray], mesh.take_triangles(found.face)
     is_apart = (mesh.faces[found.face][:, :, None] != own[:, None, :]).all(axis=(1, 2))
     # rays are in single precision: of an edge within a plane of faces they cross some
-    normal = normalise(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]))
+    normal = normalise(cross_corners(corners))
     height = np.einsum("nej,nj->ne", mesh.vertices[own] - corners[:, None, 0], normal)
     crosses = (height.min(axis=1) < -TOUCHES * mesh.diagonal) & (height.max(axis=1) > TOUCHES * mesh.diagonal)
     return own[is_apart & crosses], np.asarray(found.face)[is_apart & crosses]

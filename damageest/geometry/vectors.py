@@ -7,6 +7,11 @@ import numpy as np
 from damageest.artefacts import Floats
 
 
+def cross_corners(corners: Floats) -> Floats:
+    """(F,3) normals of triangles with ``corners`` (F,3,3), scaled by twice the area."""
+    return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
 def normalise(vectors: Floats, least: float = 1e-300) -> Floats:
     """(...,3) the vectors scaled to length 1; 0 stays 0, and one shorter than ``least``, which is rounding, short."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), least))

@@ -19,6 +19,7 @@ from damageest.geometry import (
     depth_steps,
     distance,
     duplicates,
+    edges,
     face_labels,
     far_points,
     filled,
@@ -43,6 +44,7 @@ from damageest.geometry import (
     refinement,
     remaining,
     sampling,
+    scan_field,
     shapes,
     sheets,
     skin_near,
@@ -195,6 +197,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "duplicates.group_integers": lambda r: expect(duplicates.group_integers(r.numbers), (None,), (r.count,), (None,)),
     "duplicates.find_members": lambda r: expect(duplicates.find_members(np.arange(5), r.numbers), (5,)),
     "duplicates.list_used": lambda r: expect(duplicates.list_used(r.mesh.faces), (3 * len(r.mesh.faces),)),
+    "edges.list_edges": lambda r: expect(edges.list_edges(r.mesh.faces), (3 * len(r.mesh.faces), 2)),
     "duplicates.find_duplicates": lambda r: expect(duplicates.find_duplicates(r.points), (None,), (r.count,)),
     "filled.find_filled": lambda r: expect(filled.find_filled(r.points, 0.1), (r.count,)),
     "far_points.find_far": lambda r: expect(far_points.find_far(r.points, 1.0), (r.count,)),
@@ -332,6 +335,8 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "units.describe_size": lambda r: units.describe_size(r.points, "mm") and None,
     "units.question_size": lambda r: units.question_size(0.1, r.points, "mm") and None,
     "units.diagnose_size": lambda r: units.diagnose_size(r.points, "mm") and None,
+    "scan_field.ScanField": lambda r: expect(scan_field.ScanField.measure(r.part, r.scan, 0.1).feet, (r.count, 3)),
+    "vectors.cross_corners": lambda r: expect(vectors.cross_corners(r.mesh.triangles), (len(r.mesh.faces), 3)),
     "vectors.measure_longest_edges": lambda r: expect(
         vectors.measure_longest_edges(r.mesh.triangles), (len(r.mesh.faces),)
     ),
@@ -361,7 +366,7 @@ WITHOUT_ROWS: dict[str, str] = {
         (
             "alike.have_same_shape", "alike.measure_radii",
             "bodies.split_bodies", "bodies.split_shells", "rounding.round_to_single", "simplification.simplify_within",
-            "lost_depth.LostDepth",
+            "lost_depth.LostDepth", "edges.pair_faces",
             "lost_depth.measure_lost_depth",
             "shells.Shells", "shells.drop_unused_vertices", "shells.label_components", "shells.to_body",
             "bubbles.find_bubbles", "bubbles.fill_bubbles", "near_faces.measure_shortfall",

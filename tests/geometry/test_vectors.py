@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from damageest.geometry.vectors import measure_longest_edges, normalise
+from damageest.geometry.vectors import cross_corners, measure_longest_edges, normalise
+from tests.damaged_box import box
 
 ROOT = Path(__file__).parents[2]
 BY_HAND = re.compile(
@@ -50,3 +51,10 @@ def test_nobody_normalises_rows_by_hand(folder: str) -> None:
 def test_the_longest_edge_is_the_largest_distance_of_two_corners(triangles: np.ndarray) -> None:
     wanted = [max(np.linalg.norm(a - b) for a in one for b in one) for one in triangles]
     np.testing.assert_allclose(measure_longest_edges(triangles), wanted)
+
+
+def test_the_cross_of_corners_is_that_of_the_mesh() -> None:
+    part = box()
+    assert np.array_equal(cross_corners(part.triangles), part.cross)
+    assert part.face_areas.sum() == pytest.approx(part.area)
+    assert np.allclose(part.face_areas[:, None] * part.face_normals * 2, part.cross)

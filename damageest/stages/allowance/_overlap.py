@@ -7,6 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.cutting import cut_triangles
 from damageest.geometry.distance import closest_on_mesh, distance_to_edges
+from damageest.geometry.edges import list_edges
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.stages.allowance._selectors import StockPlan
 from damageest.stages.allowance._skin import ON_PART, SkinFaces, label_skin
@@ -47,7 +48,7 @@ def _find_rim(skin: SkinFaces) -> Ints:
     border = skin.find_border_edges()
     if not len(border):
         return border
-    edges = np.sort(skin.faces[:, [[0, 1], [1, 2], [2, 0]]], axis=2)
+    edges = list_edges(skin.faces).reshape(-1, 3, 2)
     tall = edges[skin.height > 0].reshape(-1, 2)
     size = len(skin.vertices)
     return np.asarray(border[np.isin(border @ [size, 1], tall @ [size, 1])])

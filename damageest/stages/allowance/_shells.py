@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import find_members
+from damageest.geometry.vectors import cross_corners
 
 SLIVER = 1e-9
 """Area of a triangle, in squares of the skin's extent, below which its direction is not checked."""
@@ -63,7 +64,7 @@ def _is_folded(lows: Floats, tops: Floats) -> NDArray[np.bool_]:
     the radius of the skin is about the height of the stock."""
 
     def cross(corners: Floats) -> Floats:
-        return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        return cross_corners(corners)
 
     below, above = cross(lows), cross(tops)
     size = np.einsum("ij,ij->i", below, below)

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints, Mesh, Part
 from damageest.geometry.cutting import cut_triangles
 from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.edges import list_edges
+from damageest.geometry.vectors import cross_corners
 from damageest.stages.allowance._selectors import StockPlan
 
 ON_PART = 1e-7
@@ -52,7 +54,7 @@ class SkinFaces:
 
     def find_border_edges(self) -> Ints:
         """(E,2) the edges of one face only."""
-        edges = np.sort(np.concatenate([self.faces[:, [0, 1]], self.faces[:, [1, 2]], self.faces[:, [2, 0]]]), axis=1)
+        edges = list_edges(self.faces)
         unique, count = np.unique(edges, axis=0, return_counts=True)
         return np.asarray(unique[count == 1])
 
@@ -98,7 +100,7 @@ def find_on_part(vertices: Floats, faces: Ints, part: Part, origin: Floats) -> t
     distance, parent, _ = closest_on_mesh(probes + origin, part)
     near = distance.reshape(-1, 4).max(axis=1) <= ON_PART * part.diagonal
     parent = np.asarray(parent.reshape(-1, 4)[:, 3], np.int64)
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = cross_corners(corners)
     # the direction of a sliver is arbitrary, and gaps would remain without the slivers
     sliver = np.linalg.norm(cross, axis=1) < (100 * ON_PART * part.diagonal) ** 2
     return near & (sliver | (np.einsum("ij,ij->i", cross, part.cross[parent]) > 0)), parent

@@ -9,6 +9,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints, Rims, Surface
 from damageest.errors import StageError
 from damageest.geometry.duplicates import find_members
+from damageest.geometry.edges import list_edges
 from damageest.geometry.loops import trace_loops
 from damageest.geometry.vectors import normalise
 
@@ -62,7 +63,7 @@ def fill_loops(wide: ExtendedSurface) -> Ints:
     """
     rim = {int(loop.min()) for loop in wide.loops}
     size = int(wide.faces.max()) + 1
-    edges = np.sort(wide.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = list_edges(wide.faces)
     known = edges[:, 0] * size + edges[:, 1]
     fans = [wide.faces]
     for loop in trace_loops(wide.faces):
@@ -99,7 +100,7 @@ def trace_closed_path(vertices: Floats, faces: Ints, image: Ints) -> ClosedPath:
     moves = np.flatnonzero(image != after)
     if len(moves) < 3:
         raise StageError(_COLLAPSED, "a smaller background edge", method="implicit")
-    edges = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = np.unique(list_edges(faces), axis=0)
     used, edges = np.unique(edges, return_inverse=True)
     edges = edges.reshape(-1, 2)
     place = vertices[used]

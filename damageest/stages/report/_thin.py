@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.edges import list_edges
 from damageest.geometry.neighbourhoods import pick_one_per_cube
 from damageest.geometry.voxels import number_cubes
 
@@ -51,7 +52,7 @@ def thin_mesh(mesh: Mesh, most: int) -> Mesh:
 
 def find_sharp_edges(mesh: Mesh, degrees: float = 30.0) -> Ints:
     """Edges (E,2), as vertex indices, where the faces of a closed mesh meet at more than an angle."""
-    edges = np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = list_edges(mesh.faces)
     face = np.repeat(np.arange(len(mesh.faces)), 3)
     number = edges[:, 0] * len(mesh.vertices) + edges[:, 1]
     order = np.argsort(number, kind="stable")

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints, Mesh
+from damageest.geometry.edges import list_edges
 from damageest.geometry.spreading import thin
 from damageest.geometry.vectors import normalise
 
@@ -15,8 +16,8 @@ ON_EDGE, ON_CORNER = 1, 2
 def find_sharp_edges(mesh: Mesh, angle: float) -> tuple[Ints, Ints]:
     """Vertex pairs (E,2) of edges at which the surface turns by more than ``angle`` degrees, and their faces (E,2)."""
     faces = mesh.faces
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    face = np.tile(np.arange(len(faces)), 3)
+    edges = list_edges(faces)
+    face = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort((face, edges[:, 1], edges[:, 0]))
     edges, face = edges[order], face[order]
     twin = np.flatnonzero((edges[1:, 0] == edges[:-1, 0]) & (edges[1:, 1] == edges[:-1, 1]))

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import StageError
 from damageest.geometry.rays import RayCaster
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import cross_corners, normalise
 
 Keep = Callable[[Floats], Floats]
 """A function of points (N,3) that gives the probability (N,) with which each is kept."""
@@ -202,7 +202,7 @@ class _Projection:
         normal = normalise(mesh.cross[face])
         height = np.einsum("ij,ij->i", normal, corner[:, 0])
         corner = corner / np.einsum("ikj,ij->ik", corner, centre)[:, :, None]
-        across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        across = cross_corners(corner)
         return cls(position, corner, face, normal, height, np.cumsum(np.linalg.norm(across, axis=1) / 2))
 
     def draw(self, count: int, rng: np.random.Generator) -> tuple[Floats, Ints, Floats]:

@@ -12,7 +12,7 @@ from damageest.artefacts import Deposit, Floats, Ints, Mesh, Part, Solid
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh, is_inside, signed_distance
 from damageest.geometry.skin import find_inner_faces
 from damageest.geometry.solids import to_arrays, to_manifold, unite
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import cross_corners, normalise
 from damageest_cadquery._check import VOLUME, is_plane, measure_area
 from damageest_cadquery._cut import find_rim
 from damageest_cadquery._join_stock import Lump
@@ -167,7 +167,7 @@ def _compare_outlines(bases: Sequence[Base], lost: Solid, outside: Ints, part: P
     assert part.faces_brep is not None
     corners = lost.triangles[outside]
     number = part.faces_brep[closest_on_mesh(corners.mean(axis=1), part)[1]]
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = np.linalg.norm(cross_corners(corners), axis=1) / 2
     heights = {base.number: base.height for base in bases}
     more = sum(base.height * measure_area(base.face) for base in bases)
     return more - sum(height * float(areas[number == face].sum()) for face, height in heights.items())

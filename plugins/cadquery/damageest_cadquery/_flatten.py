@@ -14,6 +14,7 @@ from scipy.sparse.linalg import spsolve
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.errors import StageError
+from damageest.geometry.edges import list_edges
 from damageest.geometry.loops import trace_loops
 
 
@@ -29,7 +30,7 @@ def flatten(mesh: Mesh) -> Floats | None:
     lengths = [float(np.linalg.norm(mesh.vertices[k] - mesh.vertices[np.roll(k, 1)], axis=1).sum()) for k in loops]
     longest = int(np.argmax(lengths))
     closed = _close_holes(mesh, [loop for k, loop in enumerate(loops) if k != longest])
-    edges = np.unique(np.sort(closed.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    edges = np.unique(list_edges(closed.faces), axis=0)
     if len(closed.vertices) - len(edges) + len(closed.faces) != 1:
         return None
     places = _flatten_disk(closed, loops[longest])

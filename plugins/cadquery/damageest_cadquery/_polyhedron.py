@@ -21,6 +21,7 @@ from scipy.sparse.linalg import lsqr
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
+from damageest.geometry.edges import list_edges
 from damageest_cadquery._cut import Cut
 from damageest_cadquery._flat_faces import Flat, split_regions
 from damageest_cadquery._recognise import ALIKE, Shape, find_neighbours
@@ -174,7 +175,7 @@ def _relax(flat: Flat, rounds: int = 12) -> Mesh:
     bounds = _find_bounds(faces, flat.label, len(flat.planes), count)
     fixed = np.zeros(count, bool)
     fixed[faces[flat.label < 0]] = True
-    ends = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ends = np.unique(list_edges(faces), axis=0)
     directed = faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
     code, times = np.unique(np.sort(directed, axis=1) @ [count, 1], return_counts=True)
     rim = code[times == 1]

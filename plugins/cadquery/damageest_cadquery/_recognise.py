@@ -14,6 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.edges import list_edges
 
 Kind = Literal["plane", "cylinder", "sphere"]
 TRIES = 60
@@ -83,7 +84,7 @@ def recognise(mesh: Mesh, close: float, left: float = 0.0, seed: int = 1) -> tup
 
 def find_neighbours(faces: Ints) -> tuple[Ints, Ints]:
     """Pairs of triangles (N,) and (N,) that share an edge."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = list_edges(faces)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort(edges.T)
     same = (edges[order][1:] == edges[order][:-1]).all(1)

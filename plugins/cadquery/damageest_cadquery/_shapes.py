@@ -14,6 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints, Mesh
 from damageest.geometry.distance import closest_on_mesh
+from damageest.geometry.vectors import cross_corners
 from damageest_cadquery._outlines import cover, trace_regions
 from damageest_cadquery._recognise import Shape, recognise
 from damageest_cadquery._split import Tool
@@ -175,7 +176,7 @@ def _sample_face(face: Any, size: float) -> tuple[Floats, Floats]:
 
 def subdivide(corners: Floats, size: float) -> tuple[Floats, Floats]:
     """Points (N,3) on triangles (F,3,3), about ``size`` apart, with their areas (N,)."""
-    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    areas = np.linalg.norm(cross_corners(corners), axis=1) / 2
     longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=-1).max(axis=1)
     steps = np.clip(np.ceil(longest / size), 1, 40).astype(int)
     points, weights = [], []

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, cKDTree
 
 from damageest.artefacts import Floats, Ints
+from damageest.geometry.vectors import cross_corners
 from damageest_cadquery._doubles import SHARED
 from damageest_cadquery._edges import Edge, find_edges, measure_normals
 from damageest_cadquery._join_stock import Lump, fuse, sew_all
@@ -263,7 +264,7 @@ def _build_hull(hull: ConvexHull) -> Any:
     faces = faces.reshape(-1, 3)
     points = hull.points[used]
     corners = points[faces]
-    turned = np.einsum("ij,ij->i", np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]),
+    turned = np.einsum("ij,ij->i", cross_corners(corners),
                        hull.equations[:, :3]) < 0  # fmt: skip
     faces[turned] = faces[turned][:, ::-1]
     return orient_solid(build_solid(Solid(points, faces))[0])

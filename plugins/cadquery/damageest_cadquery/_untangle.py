@@ -6,6 +6,7 @@ import numpy as np
 from scipy.sparse import coo_array
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
+from damageest.geometry.edges import list_edges
 from damageest.geometry.refinement import bisect_faces
 from damageest.geometry.undoing import find_crossings
 from damageest.geometry.vectors import measure_longest_edges
@@ -72,7 +73,7 @@ def _find_near(mesh: Mesh, rings: int) -> Flags:
 def _smooth(mesh: Mesh, near: Flags, steps: int) -> Mesh:
     """The mesh with the vertices that are ``near`` moved half the way to the middle of their neighbours so often."""
     count = len(mesh.vertices)
-    ends = np.unique(np.sort(mesh.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0)
+    ends = np.unique(list_edges(mesh.faces), axis=0)
     ends = np.concatenate([ends, ends[:, ::-1]])
     graph = coo_array((np.ones(len(ends)), ends.T), shape=(count, count)).tocsr()[near]
     total = np.maximum(np.asarray(graph.sum(axis=1)).ravel(), 1)

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from damageest.geometry.edges import list_edges
 from damageest_cadquery._read import Model, read
 from damageest_cadquery._tessellate import measure_diagonal, tessellate
 
@@ -66,7 +67,7 @@ def _draw_edges(plotter: Any, vertices: Any, faces: Any, owner: Any) -> None:
     """Lines where two CAD faces meet."""
     import pyvista as pv
 
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = list_edges(faces)
     order = np.lexsort(edges.T)
     edges, of = edges[order], np.repeat(owner, 3)[order]
     between = (edges[1:] == edges[:-1]).all(axis=1) & (of[1:] != of[:-1])

@@ -15,7 +15,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.errors import DamageestError, InputError, StageError
 from damageest.geometry.solids import to_arrays
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import cross_corners, normalise
 from damageest.io.digests import digest
 from damageest.result import Result
 from damageest_evaluate.processes import Row
@@ -238,7 +238,7 @@ def _scan(body: Any, views: Views, count: int, noise: float, rng: np.random.Gene
     """Points and normals (N,6) of the skin that is seen from some directions."""
     vertices, faces = to_arrays(body)
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = cross_corners(corners)
     area = np.linalg.norm(cross, axis=1)
     face = rng.choice(len(area), count, p=area / area.sum())
     first, second = np.sqrt(rng.random(count)), rng.random(count)

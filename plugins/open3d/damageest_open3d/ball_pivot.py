@@ -8,6 +8,7 @@ import numpy as np
 from pydantic import Field, PositiveFloat
 
 from damageest.artefacts import Floats, Ints, Part, Surface
+from damageest.geometry.edges import list_edges
 from damageest.geometry.vectors import normalise
 from damageest.stages.reconstruct import Reconstruct
 
@@ -69,7 +70,7 @@ def _round_faces(points: Floats, normals: Floats, faces: Ints) -> tuple[Floats, 
     moved off the chord onto the arc between the tangent planes at its ends (after Vlachos et al. 2001, section 3.1)."""
     if not len(faces):
         return points, faces
-    ends, inverse = np.unique(np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1), axis=0, return_inverse=True)
+    ends, inverse = np.unique(list_edges(faces), axis=0, return_inverse=True)
     start, stop = points[ends[:, 0]], points[ends[:, 1]]
     first, second = normals[ends[:, 0]], normals[ends[:, 1]]
     height = np.einsum("ij,ij->i", second - first, stop - start) / 8

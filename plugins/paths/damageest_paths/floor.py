@@ -14,6 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree, distance_to_mesh, signed_distance
+from damageest.geometry.edges import list_edges
 from damageest.geometry.solids import to_arrays
 from damageest.geometry.vectors import normalise
 from damageest_paths.process import Process
@@ -190,7 +191,7 @@ def _keep_main(pairs: tuple[Ints, Ints], is_floor: Flags, seen: Floats) -> Flags
 
 def _find_neighbours(faces: Ints) -> tuple[Ints, Ints]:
     """The two faces (K,) of each edge that faces (F,3) share."""
-    edges = np.sort(faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    edges = list_edges(faces)
     owner = np.repeat(np.arange(len(faces)), 3)
     order = np.lexsort([edges[:, 1], edges[:, 0]])
     same = (edges[order][1:] == edges[order][:-1]).all(axis=1)

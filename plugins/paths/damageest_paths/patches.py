@@ -9,6 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.cutting import cut_triangles
+from damageest.geometry.vectors import cross_corners
 from damageest_paths.floor import Floor
 from damageest_paths.process import Process
 from damageest_paths.regions import make_region
@@ -95,7 +96,7 @@ def list_patches(sheet: Sheet, grid: Grid, reach: Floats, floor: Floor, process:
     faces = grid.faces[used[grid.faces].all(axis=1)]
     wanted = reach[faces].min(axis=1) < 0
     corners = sheet.points[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = cross_corners(corners)
     area = np.linalg.norm(cross, axis=1) / 2
     along = np.einsum("fi,fi->f", cross, sheet.upward[faces].sum(axis=1)) / 6
     cliff, steps = along < CLIFF * area, 0.0

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from damageest.geometry.vectors import cross_corners
 from damageest_cadquery.evaluate.files_rows import read_rows
 
 POINTS = 8_000
@@ -217,9 +218,7 @@ def _measure_skin(damage: Any, part: Any) -> float:
     from damageest.geometry.skin import find_inner_faces
 
     corners = damage.triangles[~find_inner_faces(damage, part)]
-    return float(
-        np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1).sum() / 2
-    )
+    return float(np.linalg.norm(cross_corners(corners), axis=1).sum() / 2)
 
 
 def _count_coloured(path: Path) -> int:

@@ -17,6 +17,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from damageest.geometry.vectors import cross_corners
+
 Floats = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.int64]
 Flags = npt.NDArray[np.bool_]
@@ -63,7 +65,7 @@ def sample(vertices: Floats, faces: Ints, count: int = SAMPLES, seed: int = 0) -
     """Places on a mesh by area: a random point in a triangle that is drawn by its area."""
     rng = np.random.default_rng(seed)
     corners = vertices[faces]
-    cross = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    cross = cross_corners(corners)
     double = np.linalg.norm(cross, axis=1)
     drawn = np.searchsorted(np.cumsum(double) / double.sum(), rng.random(count))
     drawn = np.minimum(drawn, len(faces) - 1)
