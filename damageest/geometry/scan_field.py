@@ -48,6 +48,11 @@ class ScanField:
         return self.deviation.label
 
     @cached_property
+    def intact(self) -> Floats:
+        """(K,3) the points on the skin, which tell what is still there."""
+        return np.asarray(self.points[self.label == INTACT])
+
+    @cached_property
     def feet(self) -> Floats:
         """(N,3) the place on the skin below each point."""
         return self.find_feet(np.arange(len(self.points)))

@@ -15,6 +15,7 @@ from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
+from damageest.pipeline.datums import note_datums
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
@@ -44,7 +45,8 @@ BY_FORM = "another_part"
 @step(
     gives=("adapted", "part", "aligned", "pose", "samples", "asked_fit", "warnings"),
     reads=(
-        "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "warnings", "adapter"
+        "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "warnings", "adapter",
+        "aligner",
     ),
     calls=(Adapt, Align, Sample),
 )  # fmt: skip
@@ -74,8 +76,9 @@ def adapt_part(
     if pose.doubts or pose.free:
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
             pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
-    kept = drop_settled(state.warnings, state.pose, pose)
-    return adapted, adapted.part, aligned, pose, samples, None, (*kept, *make_notes("adapt", adapted.notes))
+    told = (*drop_settled(state.warnings, state.pose, pose), *make_notes("adapt", adapted.notes))
+    told += tuple(note_datums(adapted, state.aligner, adapted.part, state.tolerance, state.unit))
+    return adapted, adapted.part, aligned, pose, samples, None, told
 
 
 def drop_settled(warnings: Reasons, before: Pose, after: Pose) -> Reasons:

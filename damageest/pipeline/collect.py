@@ -14,6 +14,7 @@ from damageest.geometry.solids import iou, to_solid, unite
 from damageest.geometry.transforms import move_points
 from damageest.output.result_json import to_dict
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.skin_points import note_unused
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.pipeline.uncertainty import shift_interval, shift_uncertainty
@@ -26,7 +27,7 @@ from damageest.rules.notes import make_notes, rank_notes
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
         "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
-        "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre",
+        "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre", "samples",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -64,7 +65,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         sites=sites,
         damage=damage,
         undamaged=subtract_from_part(part, accepted, lost),
-        warnings=rank_notes(state.warnings),
+        warnings=rank_notes((*state.warnings, *note_unused(engine, state.samples))),
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
         stages=tuple(engine.records),

@@ -8,18 +8,23 @@ from damageest.artefacts import DAMAGE, INTACT, Deviation, Part, Scan
 from damageest.checks.coverage import SkinView, measure_coverage
 from damageest.checks.facing import find_turned
 from damageest.checks.ray_evidence import trace_rays
+from damageest.checks.scan_quality import require_intact
 from damageest.checks.skin_cells import cut_skin, find_seen
+from damageest.errors import StageError
 from damageest.findings import Coverage
 from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.state import FoundSite
 from damageest.pipeline.steps import step
+from damageest.stages.segment import Segment
 
 
 @step(gives=("skin", "deviation"))
-def inspect_skin(field: ScanField) -> tuple[SkinView, Deviation]:
+def inspect_skin(field: ScanField, segmenter: Segment | None) -> tuple[SkinView, Deviation]:
     """Maps what the scan shows of the skin, and labels as damage the points that lie on no skin: those that face
-    another way, and those that rays reached through lost metal."""
+    another way, and those that rays reached through lost metal. Raises StageError where too few points near the part
+    are intact."""
     part, aligned, tolerance = field.part, field.aligned, field.tolerance
+    _check_intact(field, segmenter)
     label = field.label.copy()
     label[find_turned(field)] = DAMAGE
     deviation = replace(field.deviation, label=label)
@@ -31,6 +36,14 @@ def inspect_skin(field: ScanField) -> tuple[SkinView, Deviation]:
         rooted[rays.roots[rooted[rays.roots] == INTACT]] = DAMAGE
         deviation = replace(deviation, label=rooted)
     return SkinView(cells, seen, perhaps_seen, distance, rays), deviation
+
+
+def _check_intact(field: ScanField, segmenter: Segment | None) -> None:
+    try:
+        require_intact(field.distance, field.tolerance, field.part)
+    except StageError as error:
+        error.stage, error.use = "segment", segmenter.use if segmenter else ""
+        raise
 
 
 @step(gives="coverage")

@@ -1,51 +1,22 @@
-"""Steps that keep a pose by datums a pose by datums, where later steps move the scan, or say that it is none."""
+"""What lies on the job's datums, and whether these still hold a pose after the scan was moved."""
 
 from __future__ import annotations
 
-from contextlib import suppress
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Part, Pose, Reason, Scan
-from damageest.errors import StageError
+from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Part, Reason
 from damageest.geometry.selectors import Selector
-from damageest.geometry.transforms import invert_pose, move_points
-from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine
-from damageest.pipeline.state import JobState, Reasons
-from damageest.pipeline.steps import step
-from damageest.rules.notes import make_notes
+from damageest.geometry.transforms import move_points
+from damageest.pipeline.state import Reasons
 from damageest.stages.align import Align
 
 MOVED = 0.1
 """Movement of the part's corners, in tolerances, from which it is told that datums do not hold the pose any more."""
 
 
-@step(
-    gives=("pose", "aligned", "warnings"),
-    reads=("views", "pose", "aligned", "scan", "part", "tolerance", "aligner", "warnings", "unit"),
-    calls=(Align,),
-)
-def hold_datums(engine: Engine, state: JobState) -> tuple[Pose, Scan, Reasons]:
-    """Fits the pose to the job's datums again, where views were put right after they had been fitted. Where that fails,
-    it is told how far the views moved it."""
-    views, pose = state.views, state.pose
-    if not has_datums(state.aligner) or views is None or not any(one.is_corrected for one in views.views):
-        return pose, state.aligned, state.warnings
-    corrected = state.aligned.move(invert_pose(pose))
-    moved = state.with_value(JobState.scan, corrected, digest("corrected views", state.key("aligned")))
-    with suppress(StageError):
-        again: Pose = engine.make_silent().call(Align, moved).get(Align.gives)
-        settled = [note for note in state.warnings if note.code != "align"]
-        return again, corrected.move(again.T_part_scan), [*settled, *make_notes("align", again.notes)]
-    text = "after the correction of views the pose could not be fitted to the datums"
-    note = describe_moved(state.part, views.common, state.tolerance, state.unit, text, "fit_views: false of align")
-    return pose, state.aligned, [*state.warnings, *note]
-
-
-@step(gives="warnings")
 def note_datums(adapted: AdaptedPart | None, aligner: Align | None, part: Part, tolerance: float, unit: str) -> Reasons:
     """Warns where a pose by datums was moved to follow an adapted part."""
     if adapted is None or not has_datums(aligner):

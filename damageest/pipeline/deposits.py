@@ -24,10 +24,10 @@ SPECK, TOLD = 1e-9, 1e-5
 """Shares of a deposit's volume: below the first, an overlap is rounding; below the second, not reported."""
 
 
-@step(gives=("found", "failures"), reads=("found", "part"), calls=(Allowance,))
+@step(gives=("found", "failures"), reads=("found", "part", "tolerance"), calls=(Allowance,))
 def make_deposits(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures]:
     """Makes the deposit of each accepted site. A site that the stage refuses keeps its damage volume; what to deposit
-    is not known."""
+    is not known. No volume is in two deposits."""
     told = "others" in type(engine.job.stages[Allowance]).needs()
     done: list[FoundSite] = []
     failures: list[StageError] = []
@@ -47,7 +47,7 @@ def make_deposits(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...
                 locate_error(error, engine.job.implementations[Allowance], site)
             failures.append(error)
             done.append(replace(site.with_value(FoundSite.deposit, None), refused=True))
-    return tuple(done), failures
+    return separate_deposits(tuple(done), state.tolerance), failures
 
 
 def refuse_bubbles(deposit: Solid | None, damage: Solid, part: Solid) -> None:
@@ -71,7 +71,6 @@ def _take_left(part: Solid, lost: Solid, origin: Floats) -> Any:
     return subtract_lost(to_manifold(part, origin), to_manifold(lost, origin))
 
 
-@step(gives="found")
 def separate_deposits(found: tuple[FoundSite, ...], tolerance: float) -> tuple[FoundSite, ...]:
     """Removes from each deposit and its cavity what those of the sites before it contain, so that no volume counts
     twice."""

@@ -24,8 +24,10 @@ from damageest.registry.guards import name_observer
 from damageest.registry.outputs import check_output
 from damageest.registry.registry import Registry
 from damageest.result import StageRecord, StepRecord
+from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
+from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
@@ -39,6 +41,9 @@ OPTIONS: dict[str, Contract] = {
     "encloser_at_once": EncloseAll,
 }
 """The stages whose options steps read, by the names of these values."""
+
+TELLING = (Segment, Cluster)
+"""The contracts of a route whose notes are those of the run."""
 
 S = TypeVar("S", JobState, Candidate, FoundSite)
 T = TypeVar("T")
@@ -218,6 +223,9 @@ def follow(route: Route, engine: Engine, state: JobState) -> JobState:
             state = call_each(engine, item, state)
         else:
             state = engine.call(item, state)
+            if item in TELLING:
+                told = (*state.warnings, *make_notes(item.stage, state.get(item.gives).notes))
+                state = state.with_value(JobState.warnings, told, digest(state.key("warnings"), state.key(item.gives)))
         if not engine.silent:
             engine.last = state
     return state

@@ -3,6 +3,7 @@ right."""
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from typing import overload
 
@@ -15,14 +16,21 @@ from damageest.checks.model_fit import AskedFit, FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
 from damageest.checks.view_fit import ViewFits, fit_views
 from damageest.checks.view_split import separate_views
+from damageest.errors import StageError
 from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import find_nearby
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.scan_field import ScanField
+from damageest.geometry.transforms import invert_pose
 from damageest.pipeline.adapt import drop_settled, fit_pose
+from damageest.pipeline.cache import digest
+from damageest.pipeline.datums import describe_moved, has_datums
+from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
+from damageest.rules.notes import make_notes
+from damageest.stages.align import Align
 from damageest.stages.scan import ReadScan
 
 MEASURED = 40_000
@@ -38,12 +46,15 @@ REMEDIES = {
 
 @step(
     gives=("views", "pose", "aligned", "noise", "spacing", "tolerance", "warnings"),
-    reads=("part", "pose", "aligned", "noise", "spacing", "tolerance", "asked_tolerance", "aligner", "warnings"),
-)
-def correct_views(state: JobState) -> tuple[ViewFits | None, Pose, Scan, float, float, float, Reasons]:
+    reads=(
+        "part", "pose", "aligned", "noise", "spacing", "tolerance", "asked_tolerance", "aligner", "warnings", "unit",
+    ),
+    calls=(Align,),
+)  # fmt: skip
+def correct_views(engine: Engine, state: JobState) -> tuple[ViewFits | None, Pose, Scan, float, float, float, Reasons]:
     """Compares the views, also those that only the points tell apart, and puts misplaced ones right where the alignment
-    fits views: noise, spacing and a tolerance `auto` are then measured again, and that little of the scan lay on the
-    part is no doubt any more."""
+    fits views: noise, spacing and a tolerance `auto` are then measured again, the pose is fitted to the job's datums
+    again, and that little of the scan lay on the part is no doubt any more."""
     part, pose, aligned, noise, spacing = state.part, state.pose, state.aligned, state.noise, state.spacing
     tolerance, warnings = state.tolerance, state.warnings
     label, found_by = separate_views(part, aligned, tolerance) or (None, "given")
@@ -62,7 +73,28 @@ def correct_views(state: JobState) -> tuple[ViewFits | None, Pose, Scan, float, 
         aligned = replace(aligned, noise=noise, spacing=spacing)
         if state.asked_tolerance is None:
             tolerance = min(tolerance, choose_tolerance(None, aligned, part)[0])
+        key = digest("corrected views", [state.key(name) for name in ("part", "pose", "aligned", "tolerance")])
+        state = state.with_value(JobState.pose, pose, key).with_value(JobState.aligned, aligned, key)
+        state = state.with_value(JobState.warnings, warnings, key).with_value(JobState.tolerance, tolerance)
+        pose, aligned, warnings = _hold_datums(engine, state, views)
     return views, pose, aligned, noise, spacing, tolerance, warnings
+
+
+def _hold_datums(engine: Engine, state: JobState, views: ViewFits) -> tuple[Pose, Scan, Reasons]:
+    """Fits the pose to the job's datums again, where views were put right after they had been fitted. Where that fails,
+    it is told how far the views moved it."""
+    pose = state.pose
+    if not has_datums(state.aligner):
+        return pose, state.aligned, state.warnings
+    corrected = state.aligned.move(invert_pose(pose))
+    moved = state.with_value(JobState.scan, corrected, digest("corrected views", state.key("aligned")))
+    with suppress(StageError):
+        again: Pose = engine.make_silent().call(Align, moved).get(Align.gives)
+        settled = [note for note in state.warnings if note.code != "align"]
+        return again, corrected.move(again.T_part_scan), [*settled, *make_notes("align", again.notes)]
+    text = "after the correction of views the pose could not be fitted to the datums"
+    note = describe_moved(state.part, views.common, state.tolerance, state.unit, text, "fit_views: false of align")
+    return pose, state.aligned, [*state.warnings, *note]
 
 
 @step(gives=("scan", "pose", "aligned", "corrected_scale"))

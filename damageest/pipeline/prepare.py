@@ -8,16 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Deviation, Floats, Part, Pose, Reason, Scan, Sites
+from damageest.artefacts import Deviation, Part, Pose, Reason, Scan, Sites
 from damageest.checks.scan_quality import (
     check_walls,
     choose_tolerance,
     describe_few,
     raise_tolerance,
-    require_intact,
     require_real_clusters,
 )
-from damageest.errors import DamageestError, InputError, StageError
+from damageest.errors import DamageestError, InputError
 from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
 from damageest.geometry.distance import signed_distance
@@ -30,21 +29,28 @@ from damageest.job.model import Job
 from damageest.pipeline.cache import Cache
 from damageest.pipeline.engine import Engine, follow, start
 from damageest.pipeline.large_scans import check_crops
+from damageest.pipeline.shared import keep_shared
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.pipeline.workspace import is_in_use
 from damageest.registry.registry import Registry
-from damageest.rules.notes import make_notes
 from damageest.stages.align import Align
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
-from damageest.stages.segment import Segment
 
 COMPARED = 20_000
 """Points that the tolerance is chosen from after the alignment."""
 
 
-@step(gives="scan")
+@step(gives=("scan", "warnings"))
+def clean_scan(scan: Scan, part: Part, reader: ReadScan | None, unit: str) -> tuple[Scan, Reasons]:
+    """The scan as it is meant, without what the job crops and what is far from all else; what the reader says of it."""
+    scan = choose_columns(scan, part, reader, unit)
+    told = scan.warnings
+    scan, far = set_far_aside(crop_scan(scan, reader), part)
+    return scan, (*told, *far)
+
+
 def choose_columns(scan: Scan, part: Part, reader: ReadScan | None, unit: str) -> Scan:
     """Where the scan is not of the part's size, and its files may be meant otherwise: the one way that is, with a
     warning. Raises InputError where several are."""
@@ -67,13 +73,6 @@ def choose_columns(scan: Scan, part: Part, reader: ReadScan | None, unit: str) -
     return replace(fits[0], warnings=(*fits[0].warnings, Reason("columns", text, remedy=remedy)))
 
 
-@step(gives="warnings")
-def note_scan(scan: Scan) -> Reasons:
-    """Takes over what the reader says about the scan."""
-    return scan.warnings
-
-
-@step(gives="scan")
 def crop_scan(scan: Scan, reader: ReadScan | None) -> Scan:
     """Removes the points that the job's crops remove. Raises InputError where no point is left."""
     if reader is None or not reader.crop:
@@ -83,7 +82,6 @@ def crop_scan(scan: Scan, reader: ReadScan | None) -> Scan:
     return crop_points(scan, reader.crop)
 
 
-@step(gives=("scan", "warnings"))
 def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
     """Removes points that are too far from all others to be of the part, and says how many."""
     far = find_far(scan.points, part.diagonal)
@@ -154,16 +152,15 @@ def _measure(scan: Scan) -> tuple[float, float, float]:
     return max(noise, step / math.sqrt(12)), spacing, step
 
 
-@step(gives=("aligned", "noise", "spacing"))
-def place_scan(scan: Scan, pose: Pose) -> tuple[Scan, float, float]:
-    """Brings the scan into the part's frame."""
-    return scan.move(pose.T_part_scan), scan.noise, scan.spacing
-
-
-@step(gives="warnings")
-def note_pose(pose: Pose) -> Reasons:
-    """Takes over what the alignment says about the pose."""
-    return make_notes("align", pose.notes)
+@step(gives=("scan", "aligned", "noise", "spacing", "warnings"))
+def place_scan(
+    scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str
+) -> tuple[Scan, Scan, float, float, Reasons]:
+    """Brings the scan into the part's frame. Where an earlier scan stands for the part, points on skin that it does not
+    show are left out."""
+    aligned = scan.move(pose.T_part_scan)
+    scan, aligned, told = keep_shared(scan, aligned, part, tolerance, unit)
+    return scan, aligned, aligned.noise, aligned.spacing, told
 
 
 @step(gives=("tolerance", "warnings"))
@@ -183,26 +180,9 @@ def settle_tolerance(
 
 
 @step()
-def check_intact(deviation: Deviation, tolerance: float, part: Part, segmenter: Segment | None) -> None:
-    """Stops with a StageError where too few points near the part are intact."""
-    try:
-        require_intact(deviation.distance, tolerance, part)
-    except StageError as error:
-        error.stage, error.use = "segment", segmenter.use if segmenter else ""
-        raise
-
-
-@step()
 def check_clusters(sites: Sites, deviation: Deviation, tolerance: float, part: Part) -> None:
     """Stops with an InputError where noise alone makes very many clusters, before each of them costs an enclosure."""
     require_real_clusters(sites, deviation, tolerance, part)
-
-
-@step(gives=("intact", "warnings"))
-def gather_intact(aligned: Scan, deviation: Deviation, sites: Sites) -> tuple[Floats, Reasons]:
-    """Gathers the intact points, which tell the enclosures what is still there."""
-    intact = aligned.points[deviation.label == INTACT]
-    return intact, (*make_notes("segment", deviation.notes), *make_notes("cluster", sites.notes))
 
 
 def read_part(job: Job, registry: Registry) -> Part:
@@ -214,7 +194,7 @@ def read_part(job: Job, registry: Registry) -> Part:
 def read_inputs(job: Job, registry: Registry, memo: dict[str, Any] | None = None) -> tuple[Part, Scan]:
     """The part and the scan of a job, as their stages read them; ``memo`` takes them by the keys of what was read."""
     engine = Engine(job, registry, memo={} if memo is None else memo)
-    state = follow((ReadPart, ReadScan, choose_columns, crop_scan, set_far_aside), engine, start(engine))
+    state = follow((ReadPart, ReadScan, clean_scan), engine, start(engine))
     return state.part, state.scan
 
 

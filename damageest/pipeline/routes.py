@@ -12,8 +12,7 @@ from damageest.pipeline.adapt import adapt_part
 from damageest.pipeline.alignment import align_scan
 from damageest.pipeline.collect import collect_result
 from damageest.pipeline.coverage import describe_coverage, inspect_skin
-from damageest.pipeline.datums import hold_datums, note_datums
-from damageest.pipeline.deposits import make_deposits, separate_deposits
+from damageest.pipeline.deposits import make_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.form import correct_scale, correct_views, fit_model, question_fit
@@ -24,15 +23,9 @@ from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.pores import add_pores
 from damageest.pipeline.prepare import (
     check_clusters,
-    check_intact,
-    choose_columns,
-    crop_scan,
-    gather_intact,
+    clean_scan,
     measure_scan,
-    note_pose,
-    note_scan,
     place_scan,
-    set_far_aside,
     set_filled_aside,
     settle_tolerance,
     take_tolerance,
@@ -41,26 +34,23 @@ from damageest.pipeline.scanner import correct_temperature, weigh_scanner
 from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
-from damageest.pipeline.shared import keep_shared
 from damageest.pipeline.sites import (
     gather_sites,
-    number_sites,
     set_specks_aside,
     take_clusters,
     take_enclosures,
     where_damaged,
 )
-from damageest.pipeline.skin_points import note_unused, sample_near_damage, where_taken
+from damageest.pipeline.skin_points import sample_near_damage, where_taken
 from damageest.pipeline.surplus import find_surplus, relate_surplus
 from damageest.pipeline.tables import question_table
-from damageest.pipeline.uncertainty import measure_uncertainty, sum_budget, sum_uncertainty
+from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
 from damageest.pipeline.writing import (
     describe_output,
-    keep_form,
     show_result,
+    write_measured,
     write_output,
-    write_sections,
 )
 from damageest.stages.align import Align
 from damageest.stages.background import Background
@@ -80,10 +70,7 @@ ACQUIRE: Route = (
     ReadPart,  # unit, tolerance -> part
     check_selections,  # part ->
     ReadScan,  # unit, part -> scan
-    choose_columns,  # scan, part, reader, unit -> scan
-    note_scan,  # scan -> +warnings
-    crop_scan,  # scan, reader -> scan
-    set_far_aside,  # scan, part -> scan, +warnings
+    clean_scan,  # scan, part, reader, unit -> scan, +warnings
     correct_temperature,  # scan, temperature -> scan, thermal_scale, scan_centre
     measure_scan,  # scan, part, aligner -> noise, spacing, depth_step
     take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
@@ -95,26 +82,19 @@ ACQUIRE: Route = (
     align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, spacing, part, scan, samples
     #     -> pose, refusal
     question_table,  # calls Align: scan, part, pose, tolerance, aligner, samples -> scan, part, pose, +warnings
-    place_scan,  # scan, pose -> aligned, noise, spacing
-    note_pose,  # pose -> +warnings
     where_thinned(  # scan, reader
         add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale, scan_centre -> scan
-        place_scan,  # scan, pose -> aligned, noise, spacing
     ),
-    keep_shared,  # scan, aligned, part, tolerance, unit -> scan, aligned, +warnings
-    correct_views,  # part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings
-    #     -> views, pose, aligned, noise, spacing, tolerance, warnings
-    hold_datums,  # calls Align: views, pose, aligned, scan, part, tolerance, aligner, warnings, unit, samples
-    #     -> pose, aligned, warnings
+    place_scan,  # scan, pose, part, tolerance, unit -> scan, aligned, noise, spacing, +warnings
+    correct_views,  # calls Align: part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings,
+    #     unit, scan, samples -> views, pose, aligned, noise, spacing, tolerance, warnings
     correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader, scan_centre
     #     -> scan, pose, aligned, corrected_scale
     adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
-    #     adapter, scan -> adapted, part, aligned, pose, samples, asked_fit, warnings
-    note_datums,  # adapted, aligner, part, tolerance, unit -> +warnings
+    #     adapter, aligner, scan -> adapted, part, aligned, pose, samples, asked_fit, warnings
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
-    check_intact,  # deviation, tolerance, part, segmenter ->
-    inspect_skin,  # field -> skin, deviation
+    inspect_skin,  # field, segmenter -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
     check_clusters,  # sites, deviation, tolerance, part ->
     look_for_sheets,  # field -> sheets
@@ -122,7 +102,6 @@ ACQUIRE: Route = (
     #     samples, nearby -> surplus, deviation, +warnings
     fit_model,  # field, adapted, surplus, unit, views, corrected_scale, asked_fit -> fitted, +warnings
     set_explained_aside,  # field, sites, sheets, views, aligner, accept -> sites, explained
-    gather_intact,  # aligned, deviation, sites -> intact, +warnings
 )
 BY_SITE: Route = (
     take_clusters,  # aligned, sites, encloser, wanted -> candidates
@@ -153,7 +132,6 @@ CLOSE: Route = (
     add_pores,  # calls Reconstruct: found, failures, sites, aligned, deviation, part, tolerance, unit, field, spacing,
     #     noise -> found, failures
     set_specks_aside,  # failures, sites, aligned, deviation, unit -> failures, +warnings
-    number_sites,  # found -> found
     choose_sites,  # found, choice, field -> found, +warnings
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
@@ -168,20 +146,17 @@ CLOSE: Route = (
     #     field -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
-    separate_deposits,  # found, tolerance -> found
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
-    sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor -> volume_95
-    sum_budget,  # found, volume_95, scanner_errors, field, unit, adapted, folded, views -> budget
+    sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, scanner_errors, unit
+    #     -> volume_95, budget
     cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
-    note_unused,  # samples -> +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
     #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections,
-    #     corrected_scale, thermal_scale, scan_centre -> result
+    #     corrected_scale, thermal_scale, scan_centre, samples -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written
-    write_sections,  # written, result, folder -> written
-    keep_form,  # written, adapted, aligned, tolerance, folder -> written
+    write_measured,  # written, result, folder -> written
     describe_output,  # result, written, target -> result, content, job_text
     show_result,  # calls Report: written, result, folder, content, job_text -> result, written
     write_output,  # result, written, folder, target ->

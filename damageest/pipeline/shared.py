@@ -1,4 +1,4 @@
-"""The step that leaves what can be compared, where an earlier scan stands for the part."""
+"""What can be compared, where an earlier scan stands for the part."""
 
 from __future__ import annotations
 
@@ -8,13 +8,11 @@ from damageest.artefacts import Part, Reason, Scan
 from damageest.checks.shared_skin import find_unshared
 from damageest.errors import StageError
 from damageest.pipeline.state import Reasons
-from damageest.pipeline.steps import step
 
 FEWEST = 100
 """Points on skin that both scans show, below which nothing can be compared."""
 
 
-@step(gives=("scan", "aligned", "warnings"))
 def keep_shared(scan: Scan, aligned: Scan, part: Part, tolerance: float, unit: str) -> tuple[Scan, Scan, Reasons]:
     """Sets the points aside that show skin which the earlier scan does not. Raises StageError where nearly none is
     left. Nothing is changed where the part is as designed."""

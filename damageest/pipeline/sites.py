@@ -138,7 +138,6 @@ def set_specks_aside(
     return kept, warnings
 
 
-@step(gives="found")
 def number_sites(found: tuple[FoundSite, ...]) -> tuple[FoundSite, ...]:
     """Numbers the sites, largest first."""
     ordered = sorted(found, key=lambda site: -site.damage.volume)

@@ -40,7 +40,6 @@ def where_taken(item: Contract | Step[..., Any], by: Sequence[Contract]) -> Bran
     return Branch("where_taken", (name,), ((item,),), run)
 
 
-@step(gives="warnings")
 def note_unused(engine: Engine, samples: Samples | None) -> Reasons:
     """Names stage `sample` where the job changes it and nothing took its points."""
     stage, usual = engine.job.stages[Sample], engine.registry.get(Sample.stage, DEFAULTS[Sample])

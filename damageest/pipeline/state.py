@@ -61,7 +61,7 @@ from damageest.stages.report import ReportFiles
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
-MADE_OF = {"field": ("part", "aligned", "deviation", "tolerance")}
+MADE_OF = dict.fromkeys(("field", "intact"), ("part", "aligned", "deviation", "tolerance"))
 """Values that nothing gives: they are made of others, and as new as these."""
 
 T = TypeVar("T")
@@ -212,15 +212,14 @@ class JobState(State):
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
     ``accept``, ``asked_sections``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose
     options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers`` and
-    ``conversions``. ``tolerance``:
-    None until it is measured where the job says `auto`. ``depth_step``: of the scan's depth, 0 where it is continuous.
-    ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger. ``aligned``: the scan in
-    the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from then on; None: it is as
-    designed. ``asked_fit``: how it fits, where that was asked before. ``intact`` (K,3): its points on the nominal
-    surface. ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the
-    sites. ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files are written
-    into, ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of job.yaml.
-    ``thermal_scale``: what the scan was divided by for the part's temperature, about ``scan_centre`` (3,).
+    ``conversions``. ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's
+    depth, 0 where it is continuous. ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a
+    larger. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is
+    ``part`` from then on; None: it is as designed. ``asked_fit``: how it fits, where that was asked before. ``intact``
+    (K,3): those of the field. ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site,
+    ``found``: the sites. ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files
+    are written into, ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of
+    job.yaml. ``thermal_scale``: what the scan was divided by for the part's temperature, about ``scan_centre`` (3,).
     ``field``: part, aligned scan, deviation and tolerance as one value, which no step gives: it is that of the state.
     ``scanner_errors``: of the whole scan by certificate and temperature; ``budget``: of the total volume. ``sheets``:
     two surfaces over the same skin; ``explained``: places that views which lie apart explain, no sites.
@@ -303,6 +302,8 @@ class JobState(State):
     """That of a site is 1 or more."""
 
     def get(self, name: str) -> Any:
+        if name == "intact":
+            return self._make_field().intact
         return self._make_field() if name == "field" else super().get(name)
 
     def key(self, name: str) -> str:

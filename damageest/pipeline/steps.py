@@ -19,7 +19,7 @@ from dataclasses import dataclass
 from typing import Any, Generic, ParamSpec, TypeVar
 
 from damageest.errors import suggest
-from damageest.pipeline.state import JobState, Value
+from damageest.pipeline.state import MADE_OF, JobState, Value
 from damageest.registry.contracts import Contract
 from damageest.stages import accepts, describe_type
 
@@ -92,6 +92,8 @@ def _check(function: Callable[..., Any], named: Sequence[str], reads: Sequence[s
     for name in named:
         if not accepts(hints[name], kinds[name]):
             raise TypeError(f"{_where(function)} takes {_show(name, hints[name])}; it is a {_show(name, kinds[name])}")
+    if made := [name for name in given if name in MADE_OF]:
+        raise TypeError(f"{_where(function)} gives {made[0]}, which is made of {', '.join(MADE_OF[made[0]])}")
     result = hints["return"]
     is_tuple = typing.get_origin(result) is tuple and len(given) != 1
     returned = typing.get_args(result) if is_tuple else () if result is type(None) else (result,)

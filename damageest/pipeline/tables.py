@@ -18,6 +18,7 @@ from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
+from damageest.rules.notes import make_notes
 from damageest.stages.align import Align
 
 SAMPLES = 20_000
@@ -38,7 +39,13 @@ CONTRADICTED = 0.7
 )
 def question_table(engine: Engine, state: JobState) -> tuple[Scan, Part, Pose, Reasons]:
     """Fits two scans of a part without the table that both show, where what stands on it does not agree in the pose
-    with it; sets the table aside where more agrees then, and doubts the pose where both poses explain the scans."""
+    with it; sets the table aside where more agrees then, and doubts the pose where both poses explain the scans. Tells
+    what the alignment says of the pose."""
+    scan, part, pose, told = _question_table(engine, state)
+    return scan, part, pose, (*told, *make_notes(Align.stage, pose.notes))
+
+
+def _question_table(engine: Engine, state: JobState) -> tuple[Scan, Part, Pose, Reasons]:
     scan, part, pose, reach = state.scan, state.part, state.pose, NEAR * state.tolerance
     if part.unseen is None or state.aligner is None or not state.aligner.gives_fitted_pose:
         return scan, part, pose, ()

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from damageest.artefacts import INTACT, AdaptedPart, Flags, Ints, Pose, Solid
+from damageest.artefacts import Flags, Ints, Solid
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.checks.budget import make_depth_budget, make_volume_budget
 from damageest.checks.coverage import find_removed_cells
@@ -18,19 +18,17 @@ from damageest.checks.free_pose import measure_dependence, measure_hidden_wear
 from damageest.checks.inner_surface import measure_inner_surface
 from damageest.checks.pose_error import PoseError
 from damageest.checks.scan_quality import describe_few
-from damageest.checks.scanner import ScannerErrors
 from damageest.checks.shallow_loss import limit_shallow_loss
 from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, measure_certain, sum_free
 from damageest.checks.uncertainty import Loss, ScanErrors, limit_beside, measure_shifts, measure_site_error
-from damageest.checks.view_fit import ViewFits
 from damageest.checks.view_overlap import compare_at_site
-from damageest.findings import Budget, Fading, Interval, Sensor, Uncertainty
+from damageest.findings import Budget, Fading, Interval, Uncertainty
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
 from damageest.pipeline.form import measure_at_site
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
 from damageest.pipeline.pores import PORE
-from damageest.pipeline.state import Failures, FoundSite, JobState
+from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.stages.adapt import Adapt
 from damageest.stages.allowance import Allowance
@@ -73,12 +71,22 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     return tuple(_measure_site(state, site, taken, pose) for site in state.found)
 
 
-@step(gives="volume_95")
-def sum_uncertainty(
-    found: tuple[FoundSite, ...], failures: Failures, pose: Pose, field: ScanField, adapted: AdaptedPart | None,
-    folded: float, views: ViewFits | None, sensor: Sensor,
-) -> Interval | None:  # fmt: skip
-    """Gives the job the 95 % interval of its total volume.
+@step(
+    gives=("volume_95", "budget"),
+    reads=(
+        "found", "failures", "pose", "field", "adapted", "folded", "views", "sensor", "scanner_errors", "unit",
+    ),
+)  # fmt: skip
+def sum_uncertainty(state: JobState) -> tuple[Interval | None, Budget | None]:
+    """Gives the job the 95 % interval of its total volume, and its budget."""
+    adapted, views = state.adapted, state.views
+    hidden = (adapted.hidden if adapted else 0.0) + state.folded + (views.hidden if views else 0.0)
+    volume_95 = _sum_volume(state, hidden)
+    return volume_95, None if volume_95 is None else _sum_budget(state, hidden)
+
+
+def _sum_volume(state: JobState, hidden: float) -> Interval | None:
+    """The 95 % interval of the total volume. ``hidden``: volume that was taken for form, errors or views.
 
     There is one where each accepted site has one, and no damage was left without a volume. Sites that are not accepted
     make its high end larger: they may be damage, too, as may what an adapted part's field took for form, and what was
@@ -86,12 +94,12 @@ def sum_uncertainty(
     was found, its high end is what may lie below the tolerance and between the points; in a scan that could not show a
     site, or in a pose that is doubted, it is not known either.
     """
-    hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
+    found, failures, pose, field = state.found, state.failures, state.pose, state.field
     if not found:
         is_unknown = failures or pose.doubts or _may_hide_loss(field)
         if is_unknown:
             return None
-        shallow = limit_shallow_loss(field, sensor.least_width)
+        shallow = limit_shallow_loss(field, state.sensor.least_width)
         return 0.0, measure_hidden_wear(field.part, pose) + hidden + shallow
     lost = [error for error in failures if error.stage != Allowance.stage]
     taken = [site for site in found if site.accepted]
@@ -105,19 +113,15 @@ def sum_uncertainty(
     return (total[0], math.inf) if is_open else total
 
 
-@step(gives="budget")
-def sum_budget(
-    found: tuple[FoundSite, ...], volume_95: Interval | None, scanner_errors: ScannerErrors, field: ScanField,
-    unit: str, adapted: AdaptedPart | None, folded: float, views: ViewFits | None,
-) -> Budget | None:  # fmt: skip
-    """Makes the budget of the total volume; None where that has no interval, or there is no site."""
-    errors = [site.error for site in found if site.accepted and site.error is not None]
-    if volume_95 is None or not errors:
+def _sum_budget(state: JobState, hidden: float) -> Budget | None:
+    """The budget of the total volume; None where there is no site."""
+    errors = [site.error for site in state.found if site.accepted and site.error is not None]
+    if not errors:
         return None
-    hidden = (adapted.hidden if adapted else 0.0) + folded + (views.hidden if views else 0.0)
+    field = state.field
     return make_volume_budget(
-        errors, scanner_errors, field.aligned.noise, field.part.tessellation_error, unit,
-        doubtful=hidden + _sum_doubtful(found), free=sum_free(errors),
+        errors, state.scanner_errors, field.aligned.noise, field.part.tessellation_error, state.unit,
+        doubtful=hidden + _sum_doubtful(state.found), free=sum_free(errors),
     )  # fmt: skip
 
 
@@ -250,7 +254,7 @@ def _measure_extrapolated(state: JobState, damage: Solid, inner: Flags) -> tuple
         return 0.0, 0.0
     from scipy.spatial import cKDTree
 
-    intact = state.aligned.points[state.field.label == INTACT]
+    intact = state.field.intact
     places, normals = damage.triangles[~inner].mean(axis=1), damage.face_normals[~inner]
     far = float(np.max(cKDTree(intact).query(places)[0])) if len(intact) else 0.0
     moved = measure_shifts(adapted.part, adapted.modes, places, normals)

@@ -26,6 +26,7 @@ from damageest.geometry.voxels import measure_area
 from damageest.job.model import Accept, SiteChoice
 from damageest.pipeline.datums import choose_on_datums, has_datums
 from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
+from damageest.pipeline.sites import number_sites
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import FreePose, ScanFacts, SiteFacts
@@ -41,7 +42,9 @@ JUDGED_BY = ("field", "skin", "coverage", "pose", "unit", "views", "aligner")
 def choose_sites(
     found: tuple[FoundSite, ...], choice: SiteChoice, field: ScanField
 ) -> tuple[tuple[FoundSite, ...], Reasons]:
-    """Drops and merges sites as the job says. Numbers stay those of a run without these decisions."""
+    """Numbers the sites, and drops and merges them as the job says. Numbers stay those of a run without these
+    decisions."""
+    found = number_sites(found)
     _check_numbers("sites.drop", choice.drop, found)
     for group in choice.merge:
         _check_numbers("sites.merge", group, found)

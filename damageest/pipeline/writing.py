@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Reason, Scan
+from damageest.artefacts import Reason
 from damageest.errors import StageError
 from damageest.io.forms import FORM, MeasuredForm, hash_scan, mark_scan, write_form
 from damageest.io.section_files import write_section_files
@@ -24,32 +24,30 @@ from damageest.stages.report import Report
 
 
 @step(gives="written")
-def keep_form(
-    written: ExportedFiles, adapted: AdaptedPart | None, aligned: Scan, tolerance: float, folder: Path
-) -> ExportedFiles:
+def write_measured(written: ExportedFiles, result: Result, folder: Path) -> ExportedFiles:
+    """Writes the tables and drawings of sections, and the form of an adapted part."""
+    files = write_section_files(folder, result.sections, result.tolerance, result.units)
+    return replace(written, files=(*written.files, *files, *keep_form(result, folder)))
+
+
+def keep_form(result: Result, folder: Path) -> tuple[str, ...]:
     """Writes how an adapted part differs from the part as designed, for jobs on other parts of its type."""
+    adapted = result.adapted
     if adapted is None or adapted.field is None or adapted.seen is None or not adapted.designed:
-        return written
+        return ()
     form = MeasuredForm(
         field=adapted.field,
         seen=adapted.seen,
         left=np.zeros(len(adapted.seen)) if adapted.left is None else adapted.left,
         reach=adapted.reach,
         unit=adapted.part.unit,
-        tolerance=tolerance,
+        tolerance=result.tolerance,
         part=adapted.designed,
-        scan=hash_scan(aligned),
-        marks=mark_scan(aligned),
+        scan=hash_scan(result.aligned),
+        marks=mark_scan(result.aligned),
     )
     write_form(folder / FORM, form)
-    return replace(written, files=(*written.files, FORM))
-
-
-@step(gives="written")
-def write_sections(written: ExportedFiles, result: Result, folder: Path) -> ExportedFiles:
-    """Writes the tables and drawings of sections."""
-    files = write_section_files(folder, result.sections, result.tolerance, result.units)
-    return replace(written, files=(*written.files, *files)) if files else written
+    return (FORM,)
 
 
 @step(gives=("result", "content", "job_text"))

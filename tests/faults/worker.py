@@ -56,8 +56,8 @@ def try_job(path: Path, mode: str, registry: Any) -> dict[str, Any]:
             outcome = "unexpected" if "failed unexpectedly" in words else "done"
             return {"outcome": outcome, "volume": result.damage_volume, "words": words}
         engine = Engine(job, registry, limits=Limits(seconds=SECONDS))
-        state = follow((ReadPart, ReadScan, crop_scan), engine, start(engine))
-        part, scan = state.part, state.scan
+        state = follow((ReadPart, ReadScan), engine, start(engine))
+        part, scan = state.part, crop_scan(state.scan, state.reader)
         return {"outcome": "done", "volume": part.volume, "points": len(scan.points)}
     except DamageestError as error:
         words = str(error)

@@ -23,6 +23,7 @@ def test_a_measured_field_has_distances_and_no_labels() -> None:
     field = make_field()
     assert np.allclose(field.distance, field.points[:, 2] - TOP)
     assert (field.label == INTACT).all()
+    assert np.array_equal(field.intact, field.points)
 
 
 def test_feet_lie_on_the_skin_straight_below_the_points() -> None:

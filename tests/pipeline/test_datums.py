@@ -103,7 +103,7 @@ def test_an_adapted_part_that_takes_the_datums_along_is_told(shift: float, is_to
     adapted = AdaptedPart(part, rest, motion, np.zeros((2, *rest.shape)), 0.3, 0.1, 0.01, 0.01, (4, 3, 2))
     for datum in (DATUMS, LIST, None):
         aligner = Icp.model_validate({"datum": datum} if datum else {})
-        notes = note_datums.function(adapted, aligner, part, TOLERANCE, "mm")
+        notes = note_datums(adapted, aligner, part, TOLERANCE, "mm")
         assert [note.code for note in notes] == ["datum_moved"] * (is_told and datum is not None)
         assert all(note.amount == pytest.approx(shift) for note in notes)
 

@@ -134,15 +134,20 @@ def gives_a_wrong_second(scan: Scan) -> tuple[Floats, Pose]:
 @pytest.mark.parametrize(
     ("function", "declared", "text"),
     [
-        (takes_a_wrong_name, {"gives": "intact"}, "'scann', which is no value of a job .did you mean 'scan'"),
-        (takes_a_wrong_type, {"gives": "intact"}, "takes scan: Part; it is a scan: Scan"),
-        (gives_a_wrong_type, {"gives": "intact"}, "gives intact: Scan; it has to be intact: Floats"),
-        (gives_one, {"gives": "inact"}, "'inact', which is no value of a job .did you mean 'intact'"),
-        (gives_one, {"gives": "intact", "reads": ("toleranc",)}, "'toleranc', which is no value"),
-        (gives_one, {"gives": ("intact", "pose")}, "gives intact, pose, but returns"),
+        (takes_a_wrong_name, {"gives": "scan_centre"}, "'scann', which is no value of a job .did you mean 'scan'"),
+        (takes_a_wrong_type, {"gives": "scan_centre"}, "takes scan: Part; it is a scan: Scan"),
+        (gives_a_wrong_type, {"gives": "scan_centre"}, "gives scan_centre: Scan; it has to be scan_centre: Floats"),
+        (gives_one, {"gives": "scan_center"}, "'scan_center', which is no value of a job .did you mean 'scan_centre'"),
+        (gives_one, {"gives": "scan_centre", "reads": ("toleranc",)}, "'toleranc', which is no value"),
+        (gives_one, {"gives": ("scan_centre", "pose")}, "gives scan_centre, pose, but returns"),
         (gives_one, {}, "gives nothing, but returns"),
-        (gives_a_wrong_second, {"gives": ("intact", "deviation")}, "gives deviation: Pose; it has to be .*Deviation"),
-        (gives_a_wrong_second, {"gives": "intact"}, "gives intact: tuple"),
+        (
+            gives_a_wrong_second,
+            {"gives": ("scan_centre", "deviation")},
+            "gives deviation: Pose; it has to be .*Deviation",
+        ),
+        (gives_a_wrong_second, {"gives": "scan_centre"}, "gives scan_centre: tuple"),
+        (gives_one, {"gives": "intact"}, "gives intact, which is made of part, aligned, deviation, tolerance"),
     ],
 )
 def test_a_wrong_name_or_type_is_an_error_on_import(function: Any, declared: Any, text: str) -> None:
@@ -171,36 +176,36 @@ def begin(engine: Engine, scan: str = "s", part: str = "p") -> JobState:
 
 
 def test_keys_follow_from_what_a_step_took(engine: Engine) -> None:
-    @step(gives=("intact", "noise", "scan"))
+    @step(gives=("scan_centre", "noise", "scan"))
     def derive(scan: Scan, part: Part) -> tuple[Floats, float, Scan]:
         return scan.points, np.float64(0.25), scan
 
     def keys(state: JobState) -> dict[str, str]:
         done = engine.take(derive, state)
-        return {name: done.key(name) for name in ("intact", "noise", "scan")}
+        return {name: done.key(name) for name in ("scan_centre", "noise", "scan")}
 
     first = keys(begin(engine))
     assert keys(begin(engine)) == first
     assert keys(begin(engine).with_value(JobState.spacing, 0.3)) == first, "what was not taken does not count"
-    assert keys(begin(engine, part="q"))["intact"] != first["intact"]
+    assert keys(begin(engine, part="q"))["scan_centre"] != first["scan_centre"]
     assert keys(begin(engine, part="q"))["noise"] == first["noise"] == digest(0.25), "a number is its own key"
     assert first["scan"] == "s", "what is handed on as it was keeps its key"
 
 
 def test_what_a_step_calls_is_in_its_keys(engine: Engine, tmp_path: Path) -> None:
-    @step(gives="intact", calls=(Allowance,))
+    @step(gives="scan_centre", calls=(Allowance,))
     def give(engine: Engine, state: JobState) -> Floats:
         return POINTS
 
     assert give.takes == ("part", "tolerance"), "what is the job's of what the contract takes"
-    first = engine.take(give, begin(engine)).key("intact")
+    first = engine.take(give, begin(engine)).key("scan_centre")
     milling = load(tmp_path / "job.yaml", engine.registry, ["allowance.use=milling", "allowance.outer=1"])
     other = Engine(milling, engine.registry)
-    assert other.take(give, begin(other)).key("intact") != first
+    assert other.take(give, begin(other)).key("scan_centre") != first
 
 
 def test_a_step_sees_nothing_but_what_it_names(engine: Engine) -> None:
-    @step(gives="intact", reads=("scan",))
+    @step(gives="scan_centre", reads=("scan",))
     def peek(state: JobState) -> Floats:
         return state.part.vertices
 
@@ -242,7 +247,10 @@ def test_what_a_kept_step_gave_is_found_again(engine: Engine) -> None:
 
 
 def test_a_step_is_a_function() -> None:
-    aligned, noise, spacing = place_scan(Scan(POINTS, noise=0.1, spacing=0.2), Pose(np.eye(4)))
+    scan, part = Scan(POINTS, noise=0.1, spacing=0.2), damaged_box.box()
+    kept, aligned, noise, spacing, told = place_scan(scan, Pose(np.eye(4)), part, 0.3, "mm")
+    assert kept is scan
+    assert not told
     assert np.array_equal(aligned.points, POINTS)
     assert (noise, spacing) == (0.1, 0.2)
 
@@ -256,7 +264,7 @@ def test_a_number_of_numpy_has_the_key_of_the_same_number() -> None:
 def test_the_field_is_that_of_the_state_and_made_once(engine: Engine) -> None:
     seen: list[ScanField] = []
 
-    @step(gives="intact")
+    @step(gives="scan_centre")
     def look(field: ScanField) -> Floats:
         seen.append(field)
         return field.feet
@@ -267,9 +275,9 @@ def test_the_field_is_that_of_the_state_and_made_once(engine: Engine) -> None:
     state = state.with_value(JobState.deviation, field.deviation, "d")
     first = engine.take(look, state)
     again = engine.take(look, first)
-    assert again.key("intact") == first.key("intact")
+    assert again.key("scan_centre") == first.key("scan_centre")
     assert state.field is first.field is seen[0] is seen[-1], "what follows from it is kept"
     moved = state.with_value(JobState.deviation, field.deviation, "other")
     assert moved.field is not seen[0]
-    assert engine.take(look, moved).key("intact") != first.key("intact")
+    assert engine.take(look, moved).key("scan_centre") != first.key("scan_centre")
     assert set(MADE_OF["field"]) <= set(state.select(("field",)).values)

@@ -57,7 +57,7 @@ def test_a_part_that_was_laid_on_its_back_is_found(degrees: float, tmp_path: Pat
     after = write(tmp_path / "after.ply", *scan(turn, 2))
     part = EarlierScan.model_validate({"path": str(before)}).run("mm")
     later = ScanFile.model_validate({"path": str(after)}).run("mm")
-    halfway = run_until("note_pose", part, later, registry, tolerance=TOLERANCE)
+    halfway = run_until("place_scan", part, later, registry, tolerance=TOLERANCE)
     pose, told = halfway.state.pose, [note.code for note in halfway.state.warnings]
     assert np.abs(pose.T_part_scan[:3, :3] - turn.T).max() < 0.01
     assert ("table_aside" in told) == (degrees != 0)

@@ -14,6 +14,7 @@ import damageest
 from damageest.artefacts import Deviation, Floats, Pose, Reason, Scan
 from damageest.cli import app
 from damageest.findings import Sensor
+from damageest.pipeline.state import JobState
 from damageest.pipeline.uncertainty import sum_uncertainty
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
@@ -126,6 +127,11 @@ def test_without_sites_nothing_is_lost_unless_the_pose_is_doubted() -> None:
     skin = Deviation(np.zeros(len(points)), np.zeros(len(points), int), np.zeros(len(points), np.uint8))
     other = Pose(np.eye(4), doubts=(Reason("other_poses", "two fit", "contradicts"),))
     sensor = Sensor(0.04, 0.0, 0.0, 0.0, 0.0, 0.16, 2.0)
-    low, high = sum_uncertainty((), (), part, Pose(np.eye(4)), scan, skin, 0.16, None, 0.0, None, sensor) or (1, 0)
+    state = JobState({"found": (), "failures": (), "folded": 0.0, "views": None, "adapted": None, "sensor": sensor})
+    for name, value in (("part", part), ("aligned", scan), ("deviation", skin), ("tolerance", 0.16)):
+        state = state.with_named(name, value, name)
+    volume, budget = sum_uncertainty(state.with_value(JobState.pose, Pose(np.eye(4)), "held"))
+    low, high = volume or (1, 0)
     assert low == 0 < high < 50
-    assert sum_uncertainty((), (), part, other, scan, skin, 0.16, None, 0.0, None, sensor) is None
+    assert budget is None
+    assert sum_uncertainty(state.with_value(JobState.pose, other, "doubted")) == (None, None)
