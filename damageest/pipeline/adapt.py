@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples, Scan
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples
 from damageest.checks.model_fit import AskedFit, measure_fit
 from damageest.checks.two_sheets import measure_sheets
 from damageest.errors import StageError
@@ -17,6 +17,7 @@ from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.datums import note_datums
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
@@ -43,26 +44,27 @@ BY_FORM = "another_part"
 
 
 @step(
-    gives=("adapted", "part", "aligned", "pose", "samples", "asked_fit", "warnings"),
+    gives=("registration", "adapted", "samples", "asked_fit"),
     reads=(
-        "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "warnings", "adapter",
+        "registration", "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "adapter",
         "aligner",
     ),
     calls=(Adapt, Align, Sample),
 )  # fmt: skip
 def adapt_part(
     engine: Engine, state: JobState
-) -> tuple[AdaptedPart | None, Part, Scan, Pose, Samples | None, AskedFit | None, Reasons]:  # fmt: skip
+) -> tuple[Registration, AdaptedPart | None, Samples | None, AskedFit | None]:
     """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
     the scan and its pose moved onto it, and samples on its skin where an implementation takes them. Where the fit of
     the model was measured to ask whether the part is as designed, and the part stays so, it gives that too. Raises the
     refusal of stage `align` where the adapted part does not explain the scan either."""
     called, asked, failed = call_adapt(engine, state)
-    as_designed = (None, state.part, state.aligned, state.pose, state.samples, asked)
+    here = state.registration
     if called is None or called.get(Adapt.gives) is None:
         if state.refusal is not None:
             raise state.refusal
-        return *as_designed, (*state.warnings, *make_notes("adapt", failed))
+        here = replace(here, warnings=(*here.warnings, *make_notes("adapt", failed))) if failed else here
+        return here, None, state.samples, asked
     adapted: AdaptedPart = called.get(Adapt.gives)
     key = called.key(Adapt.gives)
     aligned = state.aligned.move(adapted.motion)
@@ -76,9 +78,10 @@ def adapt_part(
     if pose.doubts or pose.free:
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
             pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
-    told = (*drop_settled(state.warnings, state.pose, pose), *make_notes("adapt", adapted.notes))
+    told = (*drop_settled(here.warnings, here.pose, pose), *make_notes("adapt", adapted.notes))
     told += tuple(note_datums(adapted, state.aligner, adapted.part, state.tolerance, state.unit))
-    return adapted, adapted.part, aligned, pose, samples, None, told
+    here = replace(here, part=adapted.part, aligned=aligned, pose=pose, warnings=told)
+    return here, adapted, samples, None
 
 
 def drop_settled(warnings: Reasons, before: Pose, after: Pose) -> Reasons:

@@ -17,7 +17,7 @@ from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.calls import call_guarded, run_stage
 from damageest.pipeline.stage_errors import locate_error
-from damageest.pipeline.state import Candidate, FoundSite, JobState
+from damageest.pipeline.state import Candidate, FoundSite, JobState, list_given
 from damageest.pipeline.steps import GATHERED, Step
 from damageest.registry.contracts import DEFAULTS, Contract
 from damageest.registry.guards import name_observer
@@ -160,7 +160,7 @@ class Engine:
         for name, value in step.name_values(given).items():
             earlier = ""
             if name in GATHERED:
-                value = (*(() if name in step.takes else state.get(name)), *value)
+                value = (*(() if name in list_given(step.takes) else state.get(name)), *value)
                 earlier = state.key(name)
             if name not in state.values or value is not state.get(name):
                 is_plain = value is None or isinstance(value, (bool, int, float, str))

@@ -9,7 +9,7 @@ from typing import overload
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Part, Pose, Reason, Scan
+from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Pose, Reason, Scan
 from damageest.checks.fit_doubts import find_fit_doubts
 from damageest.checks.form_words import describe_fit, describe_view_of
 from damageest.checks.model_fit import AskedFit, FittedModel, measure_fit
@@ -27,6 +27,7 @@ from damageest.pipeline.adapt import drop_settled, fit_pose
 from damageest.pipeline.cache import digest
 from damageest.pipeline.datums import describe_moved, has_datums
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
@@ -45,83 +46,80 @@ REMEDIES = {
 
 
 @step(
-    gives=("views", "pose", "aligned", "noise", "spacing", "tolerance", "warnings"),
-    reads=(
-        "part", "pose", "aligned", "noise", "spacing", "tolerance", "asked_tolerance", "aligner", "warnings", "unit",
-    ),
+    gives=("registration", "views"),
+    reads=("registration", "asked_tolerance", "aligner", "unit"),
     calls=(Align,),
-)  # fmt: skip
-def correct_views(engine: Engine, state: JobState) -> tuple[ViewFits | None, Pose, Scan, float, float, float, Reasons]:
+)
+def correct_views(engine: Engine, state: JobState) -> tuple[Registration, ViewFits | None]:
     """Compares the views, also those that only the points tell apart, and puts misplaced ones right where the alignment
     fits views: noise, spacing and a tolerance `auto` are then measured again, the pose is fitted to the job's datums
     again, and that little of the scan lay on the part is no doubt any more."""
-    part, pose, aligned, noise, spacing = state.part, state.pose, state.aligned, state.noise, state.spacing
-    tolerance, warnings = state.tolerance, state.warnings
+    here = state.registration
+    part, aligned, tolerance = here.part, here.aligned, here.tolerance
     label, found_by = separate_views(part, aligned, tolerance) or (None, "given")
     moves_views = state.aligner is not None and state.aligner.moves_views
     views = fit_views(part, aligned, tolerance, moves_views, label, found_by)
     if label is not None:
         if views is None or not views.disagree:
-            return None, pose, aligned, noise, spacing, tolerance, warnings
-        aligned = replace(aligned, cloud=label.astype(np.int32))
-    if views is not None and any(view.is_corrected for view in views.views):
-        before, aligned = pose, views.apply(aligned)
-        pose, _ = fit_pose(before, views.common, aligned.points, part, tolerance)
-        pose = replace(pose, T_part_scan=_make_rigid(pose.T_part_scan))
-        warnings = drop_settled(warnings, before, pose)
-        noise, spacing = measure_noise_and_spacing(aligned.points)
-        aligned = replace(aligned, noise=noise, spacing=spacing)
-        if state.asked_tolerance is None:
-            tolerance = min(tolerance, choose_tolerance(None, aligned, part)[0])
-        key = digest("corrected views", [state.key(name) for name in ("part", "pose", "aligned", "tolerance")])
-        state = state.with_value(JobState.pose, pose, key).with_value(JobState.aligned, aligned, key)
-        state = state.with_value(JobState.warnings, warnings, key).with_value(JobState.tolerance, tolerance)
-        pose, aligned, warnings = _hold_datums(engine, state, views)
-    return views, pose, aligned, noise, spacing, tolerance, warnings
+            return here, None
+        here = replace(here, aligned=replace(aligned, cloud=label.astype(np.int32)))
+    if views is None or not any(view.is_corrected for view in views.views):
+        return here, views
+    aligned = views.apply(here.aligned)
+    pose, _ = fit_pose(here.pose, views.common, aligned.points, part, tolerance)
+    pose = replace(pose, T_part_scan=_make_rigid(pose.T_part_scan))
+    noise, spacing = measure_noise_and_spacing(aligned.points)
+    aligned = replace(aligned, noise=noise, spacing=spacing)
+    if state.asked_tolerance is None:
+        tolerance = min(tolerance, choose_tolerance(None, aligned, part)[0])
+    warnings = drop_settled(here.warnings, here.pose, pose)
+    here = replace(here, pose=pose, aligned=aligned, tolerance=tolerance, warnings=warnings)
+    if has_datums(state.aligner):
+        here = _hold_datums(engine, state, here, views)
+    return here, views
 
 
-def _hold_datums(engine: Engine, state: JobState, views: ViewFits) -> tuple[Pose, Scan, Reasons]:
-    """Fits the pose to the job's datums again, where views were put right after they had been fitted. Where that fails,
-    it is told how far the views moved it."""
-    pose = state.pose
-    if not has_datums(state.aligner):
-        return pose, state.aligned, state.warnings
-    corrected = state.aligned.move(invert_pose(pose))
-    moved = state.with_value(JobState.scan, corrected, digest("corrected views", state.key("aligned")))
+def _hold_datums(engine: Engine, state: JobState, here: Registration, views: ViewFits) -> Registration:
+    """The pose fitted to the job's datums again, after views were put right. Where that fails, it is told how far the
+    views moved it."""
+    corrected = here.aligned.move(invert_pose(here.pose))
+    moved = state.with_value(JobState.scan, corrected, digest("corrected views", state.key("registration")))
+    moved = moved.with_value(JobState.tolerance, here.tolerance)
     with suppress(StageError):
         again: Pose = engine.make_silent().call(Align, moved).get(Align.gives)
-        settled = [note for note in state.warnings if note.code != "align"]
-        return again, corrected.move(again.T_part_scan), [*settled, *make_notes("align", again.notes)]
+        settled = [note for note in here.warnings if note.code != "align"]
+        aligned = corrected.move(again.T_part_scan)
+        return replace(here, pose=again, aligned=aligned, warnings=[*settled, *make_notes("align", again.notes)])
     text = "after the correction of views the pose could not be fitted to the datums"
-    note = describe_moved(state.part, views.common, state.tolerance, state.unit, text, "fit_views: false of align")
-    return pose, state.aligned, [*state.warnings, *note]
+    note = describe_moved(here.part, views.common, here.tolerance, state.unit, text, "fit_views: false of align")
+    return replace(here, warnings=[*here.warnings, *note])
 
 
-@step(gives=("scan", "pose", "aligned", "corrected_scale"))
+@step(gives=("registration", "corrected_scale"))
 def correct_scale(
-    part: Part, scan: Scan, pose: Pose, aligned: Scan, tolerance: float, unit: str, reader: ReadScan | None,
-    scan_centre: Floats,
-) -> tuple[Scan, Pose, Scan, float]:  # fmt: skip
+    registration: Registration, unit: str, reader: ReadScan | None, scan_centre: Floats
+) -> tuple[Registration, float]:
     """Corrects the scan's scale where it is wrong and the job says so, and gives the scale that was taken out."""
     if reader is None or not reader.finds_scale:
-        return scan, pose, aligned, 1.0
+        return registration, 1.0
+    part, aligned, pose = registration.part, registration.aligned, registration.pose
     points = aligned.points[:: max(1, len(aligned.points) // MEASURED)]
     distance, _ = signed_distance(points, part)
-    found = measure_fit(part, points, distance, aligned.noise, tolerance, unit, None)
+    found = measure_fit(part, points, distance, aligned.noise, registration.tolerance, unit, None)
     if found is None or found.form is None or found.fit.model != "scaled":
-        return scan, pose, aligned, 1.0
+        return registration, 1.0
     scale, form = found.fit.scale, found.form
     # x = s R' p, undone by T and then by the scale about the frame's centre: a rigid motion of the scaled scan
     T = form.T @ pose.T_part_scan
     T[:3, 3] = (T[:3, 3] - form.frame.centre) / scale + form.frame.centre
     T = _make_rigid(T)
     T[:3, 3] -= (1 - 1 / scale) * T[:3, :3] @ scan_centre  # which stays where it is
-    pose = replace(pose, T_part_scan=T)
     moved = form.undo(aligned.points)
     corrected = divide_scan(replace(aligned, points=moved * scale), scale, np.zeros(3))
     if aligned.viewpoints is not None:
         corrected = replace(corrected, viewpoints=form.undo(aligned.viewpoints))
-    return divide_scan(scan, scale, scan_centre), pose, corrected, scale
+    scan = divide_scan(registration.scan, scale, scan_centre)
+    return replace(registration, scan=scan, pose=replace(pose, T_part_scan=T), aligned=corrected), scale
 
 
 def divide_scan(scan: Scan, scale: float, centre: Floats) -> Scan:

@@ -20,11 +20,11 @@ from damageest.geometry.duplicates import list_distinct
 from damageest.geometry.transforms import move_points
 from damageest.io.large_scans import JoinedViews
 from damageest.io.scans import join_attributes, make_scan
-from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
+from damageest.pipeline.cache import digest
+from damageest.pipeline.engine import Engine
 from damageest.pipeline.form import divide_scan
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import step
-from damageest.registry.contracts import Contract
 from damageest.stages.scan import ReadScan
 
 DEEP = 0.7
@@ -44,24 +44,23 @@ def check_crops(crops: Iterable[Crop]) -> None:
         )
 
 
-def where_thinned(*route: Contract | AnyStep) -> Branch:
-    """Follows a route only where the reader gives some points of a scan that has more."""
-
-    def run(engine: Engine, state: JobState) -> JobState:
-        return follow(route, engine, state) if state.scan.total and state.reader else state
-
-    return Branch("where_thinned", ("scan", "reader"), (route,), run)
+TAKEN = ("reader", "scan", "pose", "part", "tolerance", "unit", "thermal_scale", "scan_centre")
 
 
-@step(
-    gives="scan",
-    reads=("reader", "scan", "pose", "part", "tolerance", "unit", "thermal_scale", "scan_centre"),
-    kept=True,
-)
+@step(gives="scan", reads=TAKEN)
 def add_points_near_damage(engine: Engine, state: JobState) -> Scan:
-    """Adds all points near damage to the scan. The spacing is then that near damage."""
-    reader, scan, scale = state.reader, state.scan, state.thermal_scale
-    assert reader is not None  # as `where_thinned` asks
+    """Adds all points near damage where the reader gave some points of a scan that has more. The spacing is then that
+    near damage. What is found is kept in the cache, as the output of a stage."""
+    reader = state.reader
+    if not state.scan.total or reader is None:
+        return state.scan
+    key = digest("add_points_near_damage", [state.key(name) for name in TAKEN])
+    found: Scan = engine.remember("add_points_near_damage", key, lambda: _add_points(engine, state, reader))[1]
+    return found
+
+
+def _add_points(engine: Engine, state: JobState, reader: ReadScan) -> Scan:
+    scan, scale = state.scan, state.thermal_scale
     place = _Place(state.part, state.pose.T_part_scan, state.tolerance)
     most = max(len(scan.points) // 2, 1_000_000)
 

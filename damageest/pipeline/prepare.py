@@ -96,7 +96,7 @@ def set_far_aside(scan: Scan, part: Part) -> tuple[Scan, Reasons]:
     ]
 
 
-@step(gives=("noise", "spacing", "depth_step"), kept=True)
+@step(gives=("measured_noise", "measured_spacing", "depth_step"), kept=True)
 def measure_scan(scan: Scan, part: Part, aligner: Align | None) -> tuple[float, float, float]:
     """Measures noise and spacing of the scan, and the step of its depth. Raises InputError for one of another size, but
     for a piece of the part in a known pose."""
@@ -117,10 +117,15 @@ def say_columns(scan: Scan) -> str:
 
 @step(gives=("scan", "tolerance", "warnings"))
 def take_tolerance(
-    scan: Scan, part: Part, noise: float, spacing: float, depth_step: float, asked_tolerance: float | None
+    scan: Scan,
+    part: Part,
+    measured_noise: float,
+    measured_spacing: float,
+    depth_step: float,
+    asked_tolerance: float | None,
 ) -> tuple[Scan, float, Reasons]:
     """Takes the tolerance of the job, or one for the scan as it was measured."""
-    scan = replace(scan, noise=noise, spacing=spacing)
+    scan = replace(scan, noise=measured_noise, spacing=measured_spacing)
     tolerance, warnings = choose_tolerance(asked_tolerance, scan, part, depth_step)
     warnings = [*describe_few(scan), *warnings]
     if wrong_unit := diagnose_size(part.vertices, part.unit):
@@ -152,20 +157,17 @@ def _measure(scan: Scan) -> tuple[float, float, float]:
     return max(noise, step / math.sqrt(12)), spacing, step
 
 
-@step(gives=("scan", "aligned", "noise", "spacing", "warnings"))
-def place_scan(
-    scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str
-) -> tuple[Scan, Scan, float, float, Reasons]:
+@step(gives=("scan", "aligned", "warnings"))
+def place_scan(scan: Scan, pose: Pose, part: Part, tolerance: float, unit: str) -> tuple[Scan, Scan, Reasons]:
     """Brings the scan into the part's frame. Where an earlier scan stands for the part, points on skin that it does not
     show are left out."""
     aligned = scan.move(pose.T_part_scan)
-    scan, aligned, told = keep_shared(scan, aligned, part, tolerance, unit)
-    return scan, aligned, aligned.noise, aligned.spacing, told
+    return keep_shared(scan, aligned, part, tolerance, unit)
 
 
 @step(gives=("tolerance", "warnings"))
 def settle_tolerance(
-    tolerance: float, asked_tolerance: float | None, part: Part, aligned: Scan, noise: float
+    tolerance: float, asked_tolerance: float | None, part: Part, aligned: Scan
 ) -> tuple[float, Reasons]:
     """Where the tolerance is auto: raises it if intact surface deviates from the part by far more than the noise.
     Warns of a tolerance that the part's walls are too thin for."""
@@ -173,7 +175,7 @@ def settle_tolerance(
     warnings: list[Reason] = []
     if asked_tolerance is None and len(points):
         distance = signed_distance(points[:: max(1, math.ceil(len(points) / COMPARED))], part)[0]
-        tolerance, warnings = raise_tolerance(tolerance, distance, part, noise)
+        tolerance, warnings = raise_tolerance(tolerance, distance, part, aligned.noise)
     if diagnose_size(part.vertices, part.unit) is None and (tiny := question_size(tolerance, part.vertices, part.unit)):
         warnings = [*warnings, Reason("unit", tiny)]
     return tolerance, [*warnings, *check_walls(tolerance, part)]

@@ -17,7 +17,7 @@ from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.form import correct_scale, correct_views, fit_model, question_fit
 from damageest.pipeline.grouped_enclosure import enclose_grouped
-from damageest.pipeline.large_scans import add_points_near_damage, where_thinned
+from damageest.pipeline.large_scans import add_points_near_damage
 from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
 from damageest.pipeline.pores import add_pores
@@ -43,7 +43,6 @@ from damageest.pipeline.sites import (
 )
 from damageest.pipeline.skin_points import sample_near_damage, where_taken
 from damageest.pipeline.surplus import find_surplus, relate_surplus
-from damageest.pipeline.tables import question_table
 from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
 from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
 from damageest.pipeline.writing import (
@@ -72,27 +71,24 @@ ACQUIRE: Route = (
     ReadScan,  # unit, part -> scan
     clean_scan,  # scan, part, reader, unit -> scan, +warnings
     correct_temperature,  # scan, temperature -> scan, thermal_scale, scan_centre
-    measure_scan,  # scan, part, aligner -> noise, spacing, depth_step
-    take_tolerance,  # scan, part, noise, spacing, depth_step, asked_tolerance -> scan, tolerance, +warnings
+    measure_scan,  # scan, part, aligner -> measured_noise, measured_spacing, depth_step
+    take_tolerance,  # scan, part, measured_noise, measured_spacing, depth_step, asked_tolerance
+    #     -> scan, tolerance, +warnings
     set_filled_aside,  # scan -> scan, +warnings
     where_taken(  # samples
         Sample,  # part, tolerance -> samples
         by=(Align, Segment, EncloseAll),
     ),
-    align_scan,  # calls Align: adapter, tolerance, asked_tolerance, noise, spacing, part, scan, samples
-    #     -> pose, refusal
-    question_table,  # calls Align: scan, part, pose, tolerance, aligner, samples -> scan, part, pose, +warnings
-    where_thinned(  # scan, reader
-        add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale, scan_centre -> scan
-    ),
-    place_scan,  # scan, pose, part, tolerance, unit -> scan, aligned, noise, spacing, +warnings
-    correct_views,  # calls Align: part, pose, aligned, noise, spacing, tolerance, asked_tolerance, aligner, warnings,
-    #     unit, scan, samples -> views, pose, aligned, noise, spacing, tolerance, warnings
-    correct_scale,  # part, scan, pose, aligned, tolerance, unit, reader, scan_centre
-    #     -> scan, pose, aligned, corrected_scale
-    adapt_part,  # calls Adapt, Align, Sample: part, aligned, pose, refusal, samples, tolerance, unit, views, warnings,
-    #     adapter, aligner, scan -> adapted, part, aligned, pose, samples, asked_fit, warnings
-    settle_tolerance,  # tolerance, asked_tolerance, part, aligned, noise -> tolerance, +warnings
+    align_scan,  # calls Align: adapter, aligner, tolerance, asked_tolerance, part, scan, samples
+    #     -> scan, part, pose, refusal, +warnings
+    add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale, scan_centre -> scan
+    place_scan,  # scan, pose, part, tolerance, unit -> scan, aligned, +warnings
+    correct_views,  # calls Align: registration, asked_tolerance, aligner, unit, scan, part, samples, tolerance
+    #     -> registration, views
+    correct_scale,  # registration, unit, reader, scan_centre -> registration, corrected_scale
+    adapt_part,  # calls Adapt, Align, Sample: registration, part, aligned, pose, refusal, samples, tolerance, unit,
+    #     views, adapter, aligner, scan -> registration, adapted, samples, asked_fit
+    settle_tolerance,  # tolerance, asked_tolerance, part, aligned -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     inspect_skin,  # field, segmenter -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import typing
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, Generic, Self, TypeVar, overload
 
@@ -51,6 +51,7 @@ from damageest.job.model import Accept, SiteChoice
 from damageest.job.scanner import ScannerInfo, Temperature
 from damageest.job.sections import SectionChoice
 from damageest.pipeline.cache import digest
+from damageest.pipeline.registration import Registration
 from damageest.result import Conversion, Result
 from damageest.rules import Rule, ScanFacts
 from damageest.stages.adapt import Adapt
@@ -61,8 +62,15 @@ from damageest.stages.report import ReportFiles
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
-MADE_OF = dict.fromkeys(("field", "intact"), ("part", "aligned", "deviation", "tolerance"))
-"""Values that nothing gives: they are made of others, and as new as these."""
+MADE_OF = {
+    "field": ("part", "aligned", "deviation", "tolerance"),
+    "intact": ("part", "aligned", "deviation", "tolerance"),
+    "noise": ("aligned",),
+    "spacing": ("aligned",),
+    "registration": tuple(one.name for one in fields(Registration)),
+}
+"""Values that are made of others, and as new as these. No step gives them; one that gives a registration gives what it
+is made of."""
 
 T = TypeVar("T")
 Failures = Sequence[StageError]
@@ -212,17 +220,18 @@ class JobState(State):
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
     ``accept``, ``asked_sections``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose
     options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers`` and
-    ``conversions``. ``tolerance``: None until it is measured where the job says `auto`. ``depth_step``: of the scan's
-    depth, 0 where it is continuous. ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a
-    larger. ``aligned``: the scan in the part's frame. ``adapted``: the part deformed to follow the scan, which is
-    ``part`` from then on; None: it is as designed. ``asked_fit``: how it fits, where that was asked before. ``intact``
-    (K,3): those of the field. ``wanted``: the clusters to enclose; None: all. ``candidates``: what may become a site,
-    ``found``: the sites. ``failures``: the sites that have no damage volume or no deposit. ``folder``: that the files
-    are written into, ``target``: that they will be in. ``content``: that of result.json; ``job_text``: that of
-    job.yaml. ``thermal_scale``: what the scan was divided by for the part's temperature, about ``scan_centre`` (3,).
-    ``field``: part, aligned scan, deviation and tolerance as one value, which no step gives: it is that of the state.
-    ``scanner_errors``: of the whole scan by certificate and temperature; ``budget``: of the total volume. ``sheets``:
-    two surfaces over the same skin; ``explained``: places that views which lie apart explain, no sites.
+    ``conversions``. ``tolerance``: None until it is measured where the job says `auto`. ``measured_noise`` and
+    ``measured_spacing``: of the scan before it is aligned; ``depth_step``: of its depth, 0 where it is continuous.
+    ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger. ``aligned``: the scan in
+    the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from then on; None: it is as
+    designed. ``asked_fit``: how it fits, where that was asked before. ``intact`` (K,3): those of the field. ``wanted``:
+    the clusters to enclose; None: all. ``candidates``: what may become a site, ``found``: the sites. ``failures``: the
+    sites that have no damage volume or no deposit. ``folder``: that the files are written into, ``target``: that they
+    will be in. ``content``: that of result.json; ``job_text``: that of job.yaml. ``thermal_scale``: what the scan was
+    divided by for the part's temperature, about ``scan_centre`` (3,). ``field``: part, aligned scan, deviation and
+    tolerance as one value, which no step gives: it is that of the state. ``scanner_errors``: of the whole scan by
+    certificate and temperature; ``budget``: of the total volume. ``sheets``: two surfaces over the same skin;
+    ``explained``: places that views which lie apart explain, no sites.
     """
 
     made: dict[str, ScanField] = field(default_factory=dict, repr=False)
@@ -250,14 +259,17 @@ class JobState(State):
     tolerance = Value[float]()
     part = Value[Part]()
     scan = Value[Scan]()
+    measured_noise = Value[float]()
+    measured_spacing = Value[float]()
+    depth_step = Value[float]()
     noise = Value[float]()
     spacing = Value[float]()
-    depth_step = Value[float]()
     samples = Value[Samples | None]()
     nearby = Value[Samples | None]()
     pose = Value[Pose]()
     refusal = Value[StageError | None]()
     aligned = Value[Scan]()
+    registration = Value[Registration]()
     adapted = Value[AdaptedPart | None]()
     asked_fit = Value[AskedFit | None]()
     deviation = Value[Deviation]()
@@ -302,9 +314,13 @@ class JobState(State):
     """That of a site is 1 or more."""
 
     def get(self, name: str) -> Any:
-        if name == "intact":
-            return self._make_field().intact
-        return self._make_field() if name == "field" else super().get(name)
+        if name in ("field", "intact"):
+            return self._make_field() if name == "field" else self._make_field().intact
+        if name in ("noise", "spacing"):
+            return getattr(self.aligned, name)
+        if name == "registration":
+            return Registration(*(self.get(one) for one in MADE_OF[name]))
+        return super().get(name)
 
     def key(self, name: str) -> str:
         return digest([self.key(one) for one in MADE_OF[name]]) if name in MADE_OF else super().key(name)

@@ -3,8 +3,8 @@
 As with the ``run`` of a contract, the parameters of a step are names of values of `JobState`, and ``gives`` names what
 it returns::
 
-    @step(gives=("aligned", "noise", "spacing"))
-    def place_scan(scan: Scan, pose: Pose) -> tuple[Scan, float, float]: ...
+    @step(gives=("aligned", "warnings"))
+    def place_scan(scan: Scan, pose: Pose) -> tuple[Scan, Reasons]: ...
 
 The engine passes the values, writes what the step returns, and makes its keys. A name that `JobState` does not declare,
 or another type, is a TypeError on import.
@@ -50,9 +50,12 @@ class Step(Generic[P, R]):
         return self.function(*args, **kwargs)
 
     def name_values(self, given: Any) -> dict[str, Any]:
-        """What the function returned, by name."""
+        """What the function returned, by name; of a registration its values."""
         values = () if not self.gives else (given,) if len(self.gives) == 1 else given
-        return dict(zip(self.gives, values, strict=True))
+        named = dict(zip(self.gives, values, strict=True))
+        if found := named.pop("registration", None):
+            named |= {name: getattr(found, name) for name in MADE_OF["registration"]}
+        return named
 
 
 def step(
@@ -92,7 +95,7 @@ def _check(function: Callable[..., Any], named: Sequence[str], reads: Sequence[s
     for name in named:
         if not accepts(hints[name], kinds[name]):
             raise TypeError(f"{_where(function)} takes {_show(name, hints[name])}; it is a {_show(name, kinds[name])}")
-    if made := [name for name in given if name in MADE_OF]:
+    if made := [name for name in given if name in MADE_OF and name != "registration"]:
         raise TypeError(f"{_where(function)} gives {made[0]}, which is made of {', '.join(MADE_OF[made[0]])}")
     result = hints["return"]
     is_tuple = typing.get_origin(result) is tuple and len(given) != 1

@@ -1,4 +1,4 @@
-"""The step that asks whether an earlier and a later scan were laid on each other by a table that both show."""
+"""Whether an earlier and a later scan were laid on each other by a table that both show."""
 
 from __future__ import annotations
 
@@ -17,8 +17,6 @@ from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import JobState, Reasons
-from damageest.pipeline.steps import step
-from damageest.rules.notes import make_notes
 from damageest.stages.align import Align
 
 SAMPLES = 20_000
@@ -32,23 +30,11 @@ CONTRADICTED = 0.7
 """The same share below which the scans contradict the pose."""
 
 
-@step(
-    gives=("scan", "part", "pose", "warnings"),
-    reads=("scan", "part", "pose", "tolerance", "aligner"),
-    calls=(Align,),
-)
-def question_table(engine: Engine, state: JobState) -> tuple[Scan, Part, Pose, Reasons]:
+def question_table(engine: Engine, state: JobState, pose: Pose) -> tuple[Scan, Part, Pose, Reasons]:
     """Fits two scans of a part without the table that both show, where what stands on it does not agree in the pose
-    with it; sets the table aside where more agrees then, and doubts the pose where both poses explain the scans. Tells
-    what the alignment says of the pose."""
-    scan, part, pose, told = _question_table(engine, state)
-    return scan, part, pose, (*told, *make_notes(Align.stage, pose.notes))
-
-
-def _question_table(engine: Engine, state: JobState) -> tuple[Scan, Part, Pose, Reasons]:
-    scan, part, pose, reach = state.scan, state.part, state.pose, NEAR * state.tolerance
-    if part.unseen is None or state.aligner is None or not state.aligner.gives_fitted_pose:
-        return scan, part, pose, ()
+    with it; sets the table aside where more agrees then, and doubts the pose where both poses explain the scans."""
+    scan, part, reach = state.scan, state.part, NEAR * state.tolerance
+    assert part.unseen is not None  # an earlier scan stands for the part
     seen = np.flatnonzero(~part.unseen)
     skin = sample_by_area(part, SAMPLES, np.random.default_rng(0), seen)[0]
     below, under = find_table(skin, reach), find_table(scan.points, reach)

@@ -6,6 +6,7 @@ import ast
 import inspect
 import re
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from damageest.pipeline import routes
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.engine import Branch, Engine, Route, start
 from damageest.pipeline.prepare import place_scan
+from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import MADE_OF, Candidate, FoundSite, JobState, Reasons, Value, list_given
 from damageest.pipeline.steps import GATHERED, Step, find_value, step
 from damageest.registry import Registry
@@ -176,19 +178,21 @@ def begin(engine: Engine, scan: str = "s", part: str = "p") -> JobState:
 
 
 def test_keys_follow_from_what_a_step_took(engine: Engine) -> None:
-    @step(gives=("scan_centre", "noise", "scan"))
+    @step(gives=("scan_centre", "corrected_scale", "scan"))
     def derive(scan: Scan, part: Part) -> tuple[Floats, float, Scan]:
         return scan.points, np.float64(0.25), scan
 
     def keys(state: JobState) -> dict[str, str]:
         done = engine.take(derive, state)
-        return {name: done.key(name) for name in ("scan_centre", "noise", "scan")}
+        return {name: done.key(name) for name in ("scan_centre", "corrected_scale", "scan")}
 
     first = keys(begin(engine))
     assert keys(begin(engine)) == first
-    assert keys(begin(engine).with_value(JobState.spacing, 0.3)) == first, "what was not taken does not count"
+    assert keys(begin(engine).with_value(JobState.thermal_scale, 0.3)) == first, "what was not taken does not count"
     assert keys(begin(engine, part="q"))["scan_centre"] != first["scan_centre"]
-    assert keys(begin(engine, part="q"))["noise"] == first["noise"] == digest(0.25), "a number is its own key"
+    assert keys(begin(engine, part="q"))["corrected_scale"] == first["corrected_scale"] == digest(0.25), (
+        "a number is its own key"
+    )
     assert first["scan"] == "s", "what is handed on as it was keeps its key"
 
 
@@ -232,7 +236,7 @@ def test_warnings_are_added_unless_they_were_taken(engine: Engine) -> None:
 def test_what_a_kept_step_gave_is_found_again(engine: Engine) -> None:
     calls: list[int] = []
 
-    @step(gives=("noise", "spacing"), kept=True)
+    @step(gives=("corrected_scale", "thermal_scale"), kept=True)
     def measure(scan: Scan) -> tuple[float, float]:
         calls.append(len(scan.points))
         return np.float64(1 / 3), 0.5
@@ -240,7 +244,7 @@ def test_what_a_kept_step_gave_is_found_again(engine: Engine) -> None:
     first = engine.take(measure, begin(engine))
     later = Engine(engine.job, engine.registry, engine.cache).take(measure, begin(engine))
     assert calls == [4]
-    assert (later.noise, later.spacing) == (1 / 3, 0.5)
+    assert (later.corrected_scale, later.thermal_scale) == (1 / 3, 0.5)
     assert later.keys == first.keys
     Engine(engine.job, engine.registry, engine.cache).take(measure, begin(engine, scan="another"))
     assert calls == [4, 4]
@@ -248,17 +252,36 @@ def test_what_a_kept_step_gave_is_found_again(engine: Engine) -> None:
 
 def test_a_step_is_a_function() -> None:
     scan, part = Scan(POINTS, noise=0.1, spacing=0.2), damaged_box.box()
-    kept, aligned, noise, spacing, told = place_scan(scan, Pose(np.eye(4)), part, 0.3, "mm")
+    kept, aligned, told = place_scan(scan, Pose(np.eye(4)), part, 0.3, "mm")
     assert kept is scan
     assert not told
     assert np.array_equal(aligned.points, POINTS)
-    assert (noise, spacing) == (0.1, 0.2)
+    assert (aligned.noise, aligned.spacing) == (0.1, 0.2)
 
 
 def test_a_number_of_numpy_has_the_key_of_the_same_number() -> None:
     """What the cache gives back is a number of Python: the key has to be the same on the next run."""
     assert digest(np.float64(0.1)) == digest(0.1)
     assert digest(np.bool_(True), np.int64(3)) == digest(True, 3)
+
+
+def test_a_step_that_gives_a_registration_gives_what_it_is_made_of(engine: Engine) -> None:
+    @step(gives=("registration", "corrected_scale"))
+    def shift(registration: Registration) -> tuple[Registration, float]:
+        aligned = replace(registration.aligned, noise=0.5)
+        return replace(registration, aligned=aligned, warnings=registration.warnings[1:]), 1.5
+
+    state = begin(engine).with_value(JobState.aligned, Scan(POINTS, noise=0.1), "a")
+    state = state.with_named("tolerance", 0.2, "t").with_value(JobState.pose, Pose(np.eye(4)), "p")
+    state = state.with_value(JobState.warnings, (Reason("unit", "settled"), Reason("unit", "open")), "w")
+    assert (state.noise, state.registration.aligned) == (0.1, state.aligned)
+    done = engine.take(shift, state)
+    assert (done.noise, done.corrected_scale) == (0.5, 1.5)
+    assert [note.text for note in done.warnings] == ["open"]
+    assert done.key("aligned") != state.key("aligned")
+    for name in ("scan", "part", "pose", "tolerance"):
+        assert done.key(name) == state.key(name), "what stays as it was keeps its key"
+    assert "registration" not in done.values
 
 
 def test_the_field_is_that_of_the_state_and_made_once(engine: Engine) -> None:
