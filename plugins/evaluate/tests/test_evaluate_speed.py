@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import pytest
 from damageest_evaluate.readme import make_marks
 from damageest_evaluate.speed import KINDS, make_speed_cases
+from damageest_evaluate.whole import LARGE, OWN, Run, make_whole_table
 from evaluate_calls import evaluate
 from typer.testing import CliRunner
 
@@ -49,3 +51,30 @@ def test_cases_have_the_damage_of_their_kind(registry: Registry) -> None:
     assert len({case.compute_key() for case in cases}) == len(KINDS)
     with pytest.raises(InputError, match="no 'chip'"):
         make_speed_cases(["chip"], 0, [], registry)
+
+
+def test_options_of_one_way_are_refused_in_the_other() -> None:
+    for words in (["--whole", "--points", "2e4"], ["--program", "damageest"], ["--whole", "--kinds", "bloc"]):
+        with pytest.raises(InputError) as caught:
+            CliRunner().invoke(app, ["evaluate", "speed", *words], catch_exceptions=False)
+        assert "--program" in str(caught.value) or "'block'" in str(caught.value)
+
+
+def test_the_least_of_each_case_and_the_median_of_the_common_ones_are_shown() -> None:
+    runs = [Run("block", "new", seconds, 2.0, 10.0, ("likely", "proven", "likely")) for seconds in (8.0, 6.0, 7.0)]
+    runs += [Run("gear", "new", 10.0, 2.0, 3.0, ()), Run(LARGE, "new", 40.0, 2.0, 5.0, ())]
+    lines = [[word.strip() for word in line.strip("|").split("|")] for line in make_whole_table(runs).splitlines()]
+    assert ["block", "3.0", "6.0", "10.00", "2 likely, 1 proven"] in lines
+    assert [LARGE, "20.0", "40.0", "5.00", ""] in lines
+    assert lines[-1][:2] == ["median of the common runs", "4.0"]
+
+
+@pytest.mark.slow
+@pytest.mark.nightly
+def test_whole_runs_by_two_programs_agree() -> None:
+    done = evaluate("speed", "--whole", "--kinds", "lever", "--program", OWN, "--program", OWN, "--json")
+    assert done.returncode == 0, done.stderr
+    one, other = json.loads(done.stdout)["rows"]
+    assert one["volume"] == other["volume"] > 0
+    assert one["verdicts"] == other["verdicts"]
+    assert min(one["seconds"], other["seconds"]) > one["libigl_seconds"] > 0
