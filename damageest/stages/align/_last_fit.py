@@ -16,6 +16,9 @@ from damageest.stages.align._largest_piece import prefer_largest_piece
 from damageest.stages.align._refine_pose import refine_pose
 from damageest.stages.align._system import DatumSystem
 
+FIRST = 10_000
+"""Points of the fits before the last one, which takes all: theirs is only where it starts."""
+
 
 @dataclass(frozen=True)
 class LastFit:

@@ -13,17 +13,19 @@ from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, NEAR, PoseChe
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._evidence import DECISIVE, weigh_poses
 from damageest.stages.align._fine import Fit, fit, fit_each
+from damageest.stages.align._last_fit import FIRST
 from damageest.stages.align._normals import measure_inward
 from damageest.stages.align._pairs import propose_poses
 from damageest.stages.align._points import OrientedPoints
 from damageest.stages.align._prepare_part import PreparedPart
-from damageest.stages.align._search import search
+from damageest.stages.align._search import KEPT, search
+from damageest.stages.align._symmetries import make_reflections
 
 POINTS = 2500
 """Number of scan points that mirrored poses are compared with."""
 
-STEP = 5.0
-"""Angle between the mirror planes that are tried, in degrees."""
+FEWER = 3
+"""Of so many candidate poses one is tried where the scan is searched for anew: all that counts is whether it fits."""
 
 FITTED = 3
 """Number of mirror planes of each point whose poses are fitted."""
@@ -45,6 +47,10 @@ a scan and its mirror image show the same."""
 
 WHOLE = 0.7
 """Share of the part's surface that a mirrored scan covers, from which skin that is symmetric explains it no more."""
+
+WIDELY = 0.6
+"""Share of the part's surface that a mirrored scan covers, from which the share that it may keep off the part does not
+count: lost metal is off the part either way."""
 
 LITTLE = 0.3
 """Share of the part's surface below which a scan that fits better mirrored is doubted and not refused: a few faces have
@@ -98,8 +104,11 @@ class Handedness:
 def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> Handedness:
     """Compares the scan in its pose ``best`` with its mirror image, which is fitted no harder than the scan itself.
 
-    Raises StageError where the scan shows enough of the part and is a mirror image of it.
+    Of a part that a plane mirrors onto itself there is nothing to ask. Raises StageError where the scan shows enough of
+    the part and is a mirror image of it.
     """
+    if check.agreement >= SUSPECT and test.part.is_mirror_symmetric:
+        return Handedness()
     proper: list[Fit] = []
     if check.agreement < SUSPECT:
         proper, mirrored = [_search_again(test, rng, 1.0)], _search_again(test, rng, -1.0)
@@ -136,7 +145,8 @@ def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random
 def _is_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
     """Whether the mirrored scan lies on the part clearly better than the unmirrored one."""
     gain = mirrored.agreement - check.agreement
-    return gain > LARGE_GAIN or (gain > MIN_GAIN and 1 - mirrored.agreement < LESS * (1 - check.agreement))
+    is_less = 1 - mirrored.agreement < LESS * (1 - check.agreement) or mirrored.cover > WIDELY
+    return gain > LARGE_GAIN or (gain > MIN_GAIN and is_less)
 
 
 def _is_far_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
@@ -156,7 +166,7 @@ def _fit_reflections(test: MirrorTest, best: Fit) -> list[Fit]:
     few = at[:1500]
     tried: list[Floats] = []
     for middle in (np.zeros(3), np.median(few, axis=0)):
-        mirrors = _make_reflections(middle)
+        mirrors = make_reflections(middle)
         on = [
             float((np.abs(grid.distance[grid.find_cell(move_points(few, one).astype(np.float32))]) < COARSE).mean())
             for one in mirrors
@@ -173,20 +183,10 @@ def _search_again(test: MirrorTest, rng: np.random.Generator, side: float) -> Fi
     flip = np.array([1.0, 1.0, side])
     scan = test.oriented
     mirrored = OrientedPoints(scan.points * flip, scan.normals * flip, scan.signed)
-    pose = search(propose_poses(mirrored, test.part.pairs, test.trials, rng), mirrored, test.part.grid, rng)[0]
-    found = fit(test.part.surface, test.points * flip, pose, COARSE, test.noise, 30)
+    rough = propose_poses(mirrored, test.part.pairs, test.trials // FEWER, rng)
+    pose = search(rough, mirrored, test.part.grid, rng, (KEPT[0] // FEWER, KEPT[1] // FEWER))[0]
+    found = fit(test.part.surface, test.points[:FIRST] * flip, pose, COARSE, test.noise, 30)
     return replace(found, pose=found.pose @ np.diag([*flip, 1.0]))
-
-
-def _make_reflections(middle: Floats) -> Floats:
-    """Reflections (K,4,4) at planes through ``middle`` (3,) that contain the direction of one of the axes."""
-    angle = np.radians(np.arange(0, 180, STEP))
-    normals = [np.roll(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]), k, axis=1) for k in range(3)]
-    normal = np.concatenate(normals)
-    result = np.tile(np.eye(4), (len(normal), 1, 1))
-    result[:, :3, :3] -= 2 * normal[:, :, None] * normal[:, None, :]
-    result[:, :3, 3] = 2 * (normal @ middle)[:, None] * normal
-    return result
 
 
 def measure_share_on(test: MirrorTest, pose: Floats, band: float) -> float:

@@ -13,7 +13,7 @@ from damageest.io.part_store import Arrays, recall
 from damageest.stages.align._field import PartSurface, PlaneGrid
 from damageest.stages.align._pairs import PairTable
 from damageest.stages.align._points import OrientedPoints, orient_surface
-from damageest.stages.align._symmetries import find_symmetries
+from damageest.stages.align._symmetries import find_symmetries, is_mirrored_onto_itself
 
 MOST_KEPT = 200_000
 """Number of triangles up to which the part's data is kept for the next scan: beyond it they would take memory from
@@ -41,6 +41,15 @@ class PreparedPart:
             return {"motions": find_symmetries(self.surface, self.grid, self.pairs, self.seed)}
 
         return np.asarray(recall("symmetries", self.key, find)["motions"])
+
+    @functools.cached_property
+    def is_mirror_symmetric(self) -> bool:
+        """Whether a plane mirrors the part onto itself; found when it is asked for."""
+
+        def find() -> Arrays:
+            return {"is": np.array(is_mirrored_onto_itself(self.surface, self.grid, self.seed))}
+
+        return bool(recall("mirror", self.key, find)["is"])
 
 
 @dataclass(frozen=True)

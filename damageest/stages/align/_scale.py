@@ -12,7 +12,7 @@ from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align._check_pose import DOUBTFUL_AGREEMENT, PoseCheck
 from damageest.stages.align._choose import COARSE
 from damageest.stages.align._field import UNKNOWN
-from damageest.stages.align._fine import REACH, Fit, solve_gauss_newton
+from damageest.stages.align._fine import MAX_DRIFT, REACH, Fit, solve_gauss_newton
 from damageest.stages.align._mirror import MirrorTest, measure_share_on
 from damageest.stages.align._pairs import propose_poses
 from damageest.stages.align._points import OrientedPoints
@@ -119,21 +119,30 @@ def _search_scaled(test: MirrorTest, scale: float, rng: np.random.Generator) -> 
 def _fit_scaled(test: MirrorTest, pose: Floats) -> Floats:
     """The similarity (4,4) that fits the scan best, from ``pose`` (4,4) on, which may contain a scale."""
     points, target = test.points[:POINTS], test.part.surface
-    width, narrowest = 3 * COARSE, max(REACH * test.noise, 2e-5)
+    width, narrowest, drift = 3 * COARSE, max(REACH * test.noise, 2e-5), np.inf
     for _ in range(ROUNDS):
         at = move_points(points, pose)
-        distance, foot, face = target.closest(at)
+        if drift > MAX_DRIFT * width:
+            distance, foot, face = target.closest(at)
+            normals, drift = target.normals[face], 0.0
+            offset = np.einsum("ij,ij->i", normals, at - foot)
+        else:  # along the planes of the places that were found last
+            before, offset = offset, np.einsum("ij,ij->i", normals, at - foot)
+            distance = distance + offset - before
         within = (np.abs(distance) < width) & (distance > UNKNOWN)
         if within.sum() < 12:
             break
-        at, normals = at[within], target.normals[face[within]]
         weight = (1 - (distance[within] / width) ** 2) ** 2
-        offset = np.einsum("ij,ij->i", normals, at - foot[within])
-        middle = at.mean(axis=0)
-        twist, grows = _solve(at, normals, weight, offset, middle)
+        middle = at[within].mean(axis=0)
+        twist, grows = _solve(at[within], normals[within], weight, offset[within], middle)
         pose = make_motions(twist[None])[0] @ make_scaling(1 + grows, middle) @ pose
+        step = float(np.hypot(np.linalg.norm(twist[:3]) / 2, np.linalg.norm(twist[3:]))) + abs(grows) / 2
+        drift += step
         deviation = 1.4826 * float(np.median(np.abs(distance[within])))
-        width = min(width, max(REACH * deviation, 0.8 * width, narrowest))
+        narrower = min(width, max(REACH * deviation, 0.8 * width, narrowest))
+        if step < 0.003 * narrowest and narrower > 0.97 * width:
+            break
+        width = narrower
     return pose
 
 

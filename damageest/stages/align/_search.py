@@ -97,11 +97,17 @@ def _look_up(
     return moved, offset, np.abs(distance) < band + field.cell, agree, index if planes else distance
 
 
-def search(poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random.Generator) -> Floats:
+KEPT = (12_000, 2000)
+"""Poses that are left after the first and after the second look, each at more points."""
+
+
+def search(
+    poses: Floats, scan: OrientedPoints, field: PlaneGrid, rng: np.random.Generator, kept: tuple[int, int] = KEPT
+) -> Floats:
     """Refines and selects: at most 80 poses (K,4,4), best first, from the rough ``poses`` (H,4,4)."""
     fewest, few, some, many = (draw_by_direction(scan, count, rng) for count in (30, 100, 250, 600))
-    poses = poses[np.argsort(-score(poses, fewest, field, 0.05), kind="stable")[:12_000]]
-    poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[:2000]]
+    poses = poses[np.argsort(-score(poses, fewest, field, 0.05), kind="stable")[: kept[0]]]
+    poses = poses[np.argsort(-score(poses, few, field, 0.05), kind="stable")[: kept[1]]]
     # A coarse step may be drawn to a large fracture that is nearly parallel to the skin: the poses before it stay too.
     poses = np.concatenate([refine(poses, few, field, np.array([0.06, 0.05, 0.04, 0.03])), poses])
     poses = poses[select_distinct(poses, score(poses, some, field, 0.03), 0.03, 400)]

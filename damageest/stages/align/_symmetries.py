@@ -1,7 +1,10 @@
 """The symmetries of a part: rigid motions that map it onto itself. Found once, they give all poses that fit alike from
-one of them, and the others need no fit of their own."""
+one of them, and the others need no fit of their own. And whether a plane mirrors it onto itself: then a scan and its
+mirror image show the same."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -28,6 +31,11 @@ FAILURES = 5
 MOST = 400
 """Symmetries beyond which a part is not described by them: it is nearly one of revolution."""
 
+STEP = 5.0
+"""Angle between the mirror planes that are tried, in degrees."""
+MIRRORS, NEAR = 3, 0.012
+"""Mirror planes that are fitted: the best, and only where the mean distance of their images is less, in diagonals."""
+
 
 def find_symmetries(target: PartSurface, grid: PlaneGrid, pairs: PairTable, seed: int) -> Floats:
     """The symmetries (G,4,4) of a part that is centred and scaled to a diagonal of 1, the identity first.
@@ -45,7 +53,7 @@ def find_symmetries(target: PartSurface, grid: PlaneGrid, pairs: PairTable, seed
         if measure_apart(group, rough).min() < 2 * START:
             continue
         motion = fit(target, surface[:1500], rough, START, 0.0, 15).pose
-        if not all(np.abs(target.closest(move_points(some, motion))[0]).max() < EXACT for some in (surface, corners)):
+        if not _maps_onto_itself(target, motion, (surface, corners)):
             failures += 1
             if failures == FAILURES:
                 break
@@ -59,6 +67,48 @@ def find_symmetries(target: PartSurface, grid: PlaneGrid, pairs: PairTable, seed
             break
         group = larger
     return group
+
+
+def is_mirrored_onto_itself(target: PartSurface, grid: PlaneGrid, seed: int) -> bool:
+    """Whether a plane mirrors a part of diagonal 1 onto itself: one that holds the direction of an axis of its frame.
+
+    Middles of triangles are verified too: those in the wall of a hole lie inside the part where its rims lie on it.
+    """
+    if target.unseen is not None:
+        return False
+    rng = np.random.default_rng([seed, 3])
+    surface = orient_surface(target.known, 4000, rng).points
+    mirrors = make_reflections(surface.mean(axis=0))
+    on = [
+        float(np.abs(grid.distance[grid.find_cell(move_points(surface[:1000], one).astype(np.float32))]).mean())
+        for one in mirrors
+    ]
+    corners, middles = target.mesh.vertices, target.mesh.vertices[target.mesh.faces].mean(axis=1)
+    checked = [surface, *(some[rng.permutation(len(some))[:MOST_CORNERS]] for some in (corners, middles))]
+    for index in np.argsort(on, kind="stable")[:MIRRORS]:
+        if on[index] > NEAR:
+            break
+        mirror = mirrors[index]
+        moved = move_points(surface[:600], mirror)
+        motion = fit(target, moved, np.eye(4), START, 0.0, 15).pose @ mirror
+        if _maps_onto_itself(target, motion, checked):
+            return True
+    return False
+
+
+def _maps_onto_itself(target: PartSurface, motion: Floats, checked: Sequence[Floats]) -> bool:
+    return all(np.abs(target.closest(move_points(some, motion))[0]).max() < EXACT for some in checked)
+
+
+def make_reflections(middle: Floats) -> Floats:
+    """Reflections (K,4,4) at planes through ``middle`` (3,) that contain the direction of one of the axes."""
+    angle = np.radians(np.arange(0, 180, STEP))
+    normals = [np.roll(np.column_stack([np.cos(angle), np.sin(angle), 0 * angle]), k, axis=1) for k in range(3)]
+    normal = np.concatenate(normals)
+    result = np.tile(np.eye(4), (len(normal), 1, 1))
+    result[:, :3, :3] -= 2 * normal[:, :, None] * normal[:, None, :]
+    result[:, :3, 3] = 2 * (normal @ middle)[:, None] * normal
+    return result
 
 
 def measure_apart(motions: Floats, one: Floats) -> Floats:

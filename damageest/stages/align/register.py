@@ -50,7 +50,7 @@ class Register(Align):
         from damageest.stages.align._choose import COARSE, Choice, choose_pose
         from damageest.stages.align._fine import fit
         from damageest.stages.align._frame import MIN_POINTS, Frame
-        from damageest.stages.align._last_fit import LastFit
+        from damageest.stages.align._last_fit import FIRST, LastFit
         from damageest.stages.align._mirror import MIN_GAIN, MirrorTest, ask_handedness
         from damageest.stages.align._normals import SignedNormals, note_inward, prefer_outward
         from damageest.stages.align._pairs import propose_poses
@@ -88,7 +88,7 @@ class Register(Align):
         if given.signed:
             choice = choice.keep(prefer_outward(target, given, choice.poses, choice.band))
         last = LastFit(frame, fine, dense, noise, tolerance / frame.size, part.unit, datum)
-        finish, check = last.run(fit(target, fine, choice.pose, COARSE / 2, noise, 30))
+        finish, check = last.run(fit(target, fine[:FIRST], choice.pose, COARSE / 2, noise, 30))
         doubts: tuple[Reason, ...] = ()
         test = MirrorTest(
             prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials, scan.normals is not None
@@ -116,7 +116,7 @@ class Register(Align):
         doubts = check.note_doubts() + finish.doubts + doubts + note_ambiguity(choice, prepared)
         free, loose = finish.free, tuple[str, ...]()
         if not (free or finish.datums):
-            free = find_loose_motions(frame, best.pose, fine, best.band, part.unit)
+            free = find_loose_motions(frame, best.pose, fine[:FIRST], best.band, part.unit)
             loose = tuple(one.text for one in free)
         told = note_inward(target, frame, scan, best)
         notes = (*describe_choice(choice), *told, *map(str, doubts), *loose, *finish.notes)

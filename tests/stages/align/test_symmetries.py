@@ -14,18 +14,41 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_arrays
 from damageest.geometry.transforms import move_points
 from damageest.stages.align._field import PartSurface
-from damageest.stages.align._prepare_part import prepare_part
+from damageest.stages.align._prepare_part import PreparedPart, prepare_part
+
+
+def prepare(body: Manifold) -> PreparedPart:
+    vertices, faces = to_arrays(body)
+    low, high = vertices.min(axis=0), vertices.max(axis=0)
+    return prepare_part(PartSurface(Mesh((vertices - (low + high) / 2) / np.linalg.norm(high - low), faces)), 0)
 
 
 def find(body: Manifold) -> tuple[Floats, Mesh]:
-    vertices, faces = to_arrays(body)
-    low, high = vertices.min(axis=0), vertices.max(axis=0)
-    mesh = Mesh((vertices - (low + high) / 2) / np.linalg.norm(high - low), faces)
-    return prepare_part(PartSurface(mesh), 0).symmetries, mesh
+    part = prepare(body)
+    return part.symmetries, part.surface.mesh
 
 
 def prism(sides: int) -> Manifold:
     return Manifold.cylinder(20, 15, circular_segments=sides)
+
+
+BOX = Manifold.cube((40, 30, 20))
+HOLE = Manifold.cylinder(30, 0.8, circular_segments=12)
+
+
+@pytest.mark.parametrize(
+    ("body", "is_mirrored"),
+    [
+        (BOX - HOLE.translate((5, 15, 0)), True),
+        (BOX - HOLE.translate((5, 10, 0)), True),  # straight through: by the plane across its axis
+        (BOX - HOLE.translate((5, 10, 15)), False),
+        (prism(7) - HOLE.translate((0, 0, 15)), True),
+    ],
+)
+def test_a_part_that_a_plane_mirrors_onto_itself_is_told_from_one_with_a_hole_elsewhere(
+    body: Manifold, is_mirrored: bool
+) -> None:
+    assert prepare(body.rotate((0, 0, 31))).is_mirror_symmetric == is_mirrored
 
 
 @pytest.mark.variants(1)
