@@ -1,4 +1,4 @@
-"""The step for bodies of the part that are gone altogether: no inner damage surface is left of them."""
+"""Bodies of the part that are gone altogether: no inner damage surface is left of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,6 @@ from damageest.artefacts import Evidence, Part, Solid
 from damageest.checks.coverage import SkinView
 from damageest.geometry.bodies import label_pieces
 from damageest.pipeline.state import FoundSite
-from damageest.pipeline.steps import step
 
 BY_RAYS_ALONE = "rays"
 """The method of a site without scan points on it."""
@@ -18,7 +17,6 @@ PASSED = 0.1
 """Share of a body's skin that rays have to have passed through."""
 
 
-@step(gives="found")
 def add_lost_bodies(part: Part, skin: SkinView, found: tuple[FoundSite, ...]) -> tuple[FoundSite, ...]:
     """Makes a site of each connected body of the part of which the scan shows nothing, and through which rays of the
     scanner passed."""

@@ -1,4 +1,4 @@
-"""The step for pores: closed inner surfaces that do not reach the skin, as tomography shows them."""
+"""Pores: closed inner surfaces that do not reach the skin, as tomography shows them."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState
-from damageest.pipeline.steps import step
 from damageest.stages.boundary import Boundary
 from damageest.stages.reconstruct import Reconstruct
 
@@ -22,32 +21,27 @@ DEEP = 2.0
 """Depth in tolerances, and in point spacings, below which all of a pore lies."""
 
 
-@step(
-    gives=("found", "failures"),
-    reads=("found", "failures", "sites", "aligned", "deviation", "part", "tolerance", "unit", "field"),
-    calls=(Reconstruct,),
-)
-def add_pores(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures]:
+def add_pores(engine: Engine, state: JobState, found: tuple[FoundSite, ...]) -> tuple[tuple[FoundSite, ...], Failures]:
     """Makes a site of each cluster without a rim whose inner surface is closed and lies well inside the metal.
 
     It counts as lost metal. It is never deposited: nothing could reach it.
     """
-    found, kept = list(state.found), []
+    pores, kept = [], []
     for error in state.failures:
         pore = _make_pore(engine, state, error.site) if error.stage == Boundary.stage and error.site else None
         if pore is None:
             kept.append(error)
         else:
-            found.append(pore)
-    return tuple(found), tuple(kept)
+            pores.append(pore)
+    return (*found, *pores), tuple(kept)
 
 
 def _make_pore(engine: Engine, state: JobState, number: int) -> FoundSite | None:
     """The site of a cluster that is a pore; None where its points lie near the skin, or bound no volume."""
-    members = state.sites.members(number)
-    points = state.aligned.points[members]
-    least = DEEP * max(state.tolerance, state.aligned.spacing)
-    if -float(state.deviation.distance[members].max()) < least:
+    field, members = state.field, state.sites.members(number)
+    points = field.points[members]
+    least = DEEP * max(field.tolerance, field.aligned.spacing)
+    if -float(field.distance[members].max()) < least:
         return None
     candidate = Candidate(number=number, clusters=(number,), method=PORE)
     candidate = candidate.with_value(Candidate.points, points).with_value(Candidate.fine, True)
@@ -58,8 +52,8 @@ def _make_pore(engine: Engine, state: JobState, number: int) -> FoundSite | None
     solid = _close(surface)
     if solid is None:
         return None
-    below = -float(signed_distance(solid.vertices, state.part)[0].max())
-    evidence = weigh_evidence(solid, points, state.field)
+    below = -float(signed_distance(solid.vertices, field.part)[0].max())
+    evidence = weigh_evidence(solid, points, field)
     note = (
         f"a closed pore at least {below:.3g} {state.unit} below the skin; it counts as lost, but is in no deposit or "
         "path; mill down to it to fill it"

@@ -18,9 +18,7 @@ from damageest.pipeline.fallback import fall_back
 from damageest.pipeline.form import correct_scale, correct_views, fit_model, question_fit
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.large_scans import add_points_near_damage
-from damageest.pipeline.lost_bodies import add_lost_bodies
 from damageest.pipeline.paths import plan_paths
-from damageest.pipeline.pores import add_pores
 from damageest.pipeline.prepare import (
     check_clusters,
     clean_scan,
@@ -35,8 +33,8 @@ from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
 from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
 from damageest.pipeline.sites import (
+    complete_sites,
     gather_sites,
-    set_specks_aside,
     take_clusters,
     take_enclosures,
     where_damaged,
@@ -124,10 +122,8 @@ AT_ONCE: Route = (
     gather_sites,  # candidates, sites, field, unit -> found, +failures, +warnings
 )
 CLOSE: Route = (
-    add_lost_bodies,  # part, skin, found -> found
-    add_pores,  # calls Reconstruct: found, failures, sites, aligned, deviation, part, tolerance, unit, field, spacing,
-    #     noise -> found, failures
-    set_specks_aside,  # failures, sites, aligned, deviation, unit -> failures, +warnings
+    complete_sites,  # calls Reconstruct: part, skin, found, failures, sites, field, unit, tolerance, spacing, noise
+    #     -> found, failures, +warnings
     choose_sites,  # found, choice, field -> found, +warnings
     describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
     relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings

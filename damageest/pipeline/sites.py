@@ -6,17 +6,20 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Enclosures, Floats, Ints, Reason, Scan, Sites
+from damageest.artefacts import Enclosures, Floats, Ints, Reason, Scan, Sites
 from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
+from damageest.pipeline.lost_bodies import add_lost_bodies
+from damageest.pipeline.pores import add_pores
 from damageest.pipeline.stage_errors import describe_points
 from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.registry.contracts import Contract
 from damageest.stages.enclose import Enclose, EncloseAll
+from damageest.stages.reconstruct import Reconstruct
 
 SPECK = 50
 """Points of a cluster below which a failure to enclose it is a warning and not a failure of the run."""
@@ -118,18 +121,28 @@ def find_place(points: Floats, members: Ints) -> tuple[float, float, float]:
     return x, y, z
 
 
-@step(gives=("failures", "warnings"))
-def set_specks_aside(
-    failures: Failures, sites: Sites, aligned: Scan, deviation: Deviation, unit: str
-) -> tuple[Failures, Reasons]:
+@step(
+    gives=("found", "failures", "warnings"),
+    reads=("part", "skin", "found", "failures", "sites", "field", "unit"),
+    calls=(Reconstruct,),
+)
+def complete_sites(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ...], Failures, Reasons]:
+    """Adds the sites that no enclosure gives: bodies of the part that are gone altogether, and pores."""
+    found = add_lost_bodies(state.part, state.skin, state.found)
+    found, failures = add_pores(engine, state, found) if state.failures else (found, state.failures)
+    kept, told = _set_specks_aside(failures, state.sites, state.field, state.unit)
+    return found, kept, told
+
+
+def _set_specks_aside(failures: Failures, sites: Sites, field: ScanField, unit: str) -> tuple[Failures, Reasons]:
     """Turns failures on clusters that are too small to be enclosed into warnings: stray points form such clusters."""
     kept, warnings = [], []
     for error in failures:
         members = sites.members(error.site) if error.place and error.site else np.empty(0, np.int64)
         if 0 < len(members) < SPECK:
-            depth = float(-deviation.distance[members].min())
+            depth = float(-field.distance[members].min())
             text = f"{error.place}, up to {depth:.3g} {unit} deep, are too few for a volume and were left out"
-            place = find_place(aligned.points, members)
+            place = find_place(field.points, members)
             warnings.append(
                 Reason("speck", text, amount=depth, unit=unit, place=place, remedy="scan this place more densely")
             )
