@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Mesh, Part, Solid
+from damageest.artefacts import Flags, Floats, Part, Solid
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.edges import pair_faces
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 from damageest.geometry.sampling import sample_by_area
-from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.skin import find_inner_faces, take_lost_skin
 from damageest.rules.beyond_points import ASKED, CONTRADICTED
 
 PLACES, MOST = 4000, 20_000
@@ -68,7 +68,7 @@ def ask_beyond_points(
         return BeyondPoints()
     volume = solid.volume
     area = solid.face_areas
-    skin = Mesh(solid.vertices, solid.faces[~inner])
+    skin = take_lost_skin(solid, inner)
     depth = float(distance_to_mesh(own[:: max(1, len(own) // MOST)], skin).max())
     behind, before, bare = _compare_with_points(
         solid, inner, points, 2 * max(gap, tolerance), BARE * max(gap, tolerance)

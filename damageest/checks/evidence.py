@@ -15,7 +15,6 @@ from damageest.artefacts import (
     EvidenceCause,
     Flags,
     Floats,
-    Mesh,
     Part,
     Solid,
 )
@@ -25,7 +24,7 @@ from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.point_pieces import number_pieces
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.scan_field import ScanField
-from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.skin import find_inner_faces, take_lost_skin
 from damageest.geometry.threads import count_threads
 
 MOST = 10_000
@@ -64,7 +63,7 @@ def weigh_evidence(damage: Solid, ids_points: Floats, field: ScanField) -> Evide
     intact = intact[_measure_gap(intact, on_skin, close) <= close]
     intact = intact[_measure_gap(intact, on_ids, 1.5 * reach) > 1.5 * reach]
     if len(intact):  # against the skin's few faces first: most points are beside the damage volume
-        skin_only = Mesh(damage.vertices, damage.faces[~inner])
+        skin_only = take_lost_skin(damage, inner)
         intact = intact[distance_to_mesh(intact, skin_only) < tolerance]
     inside, contradicted = 0, 0.0
     if len(intact):
@@ -112,7 +111,7 @@ def _count_intact_over(damage: Solid, inner: Flags, field: ScanField) -> float:
     step = max(1, len(here) // MOST)
     here = here[::step]
     feet = field.find_feet(here)
-    skin_only = Mesh(damage.vertices, damage.faces[~inner])
+    skin_only = take_lost_skin(damage, inner)
     if not len(skin_only.faces):
         return 0.0
     feet = feet[

@@ -11,13 +11,14 @@ from collections.abc import Callable
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Mesh, Solid
+from damageest.artefacts import Flags, Floats, Solid
 from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.skin_cells import AVERAGED
 from damageest.findings import Fading
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.skin import take_inner_surface
 from damageest.geometry.voxels import number_faced_cubes
 
 SHALLOW = 4.0
@@ -51,7 +52,7 @@ def measure_fading(
     if not len(on_skin) or not inner.any():
         return None
     places, _ = sample_by_area(damage, SAMPLES, np.random.default_rng(0), on_skin)
-    bottom = Mesh(damage.vertices, damage.faces[inner])
+    bottom = take_inner_surface(damage, inner)
     if float(np.median(distance_to_mesh(places[::FIRST], bottom))) > SHALLOW * tolerance:
         return None
     depth = distance_to_mesh(places, bottom)

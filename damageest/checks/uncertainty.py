@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Mesh, Part, Scan, Solid
+from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
 from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface
 from damageest.checks.pose_error import PoseError
@@ -22,6 +22,7 @@ from damageest.geometry.edges import pair_faces
 from damageest.geometry.lost_depth import LostDepth
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.skin import take_inner_surface
 from damageest.rules import ScanFacts
 from damageest.rules.inner_surface import GAP
 
@@ -203,7 +204,7 @@ def measure_shifts(part: Part, fields: Floats, places: Floats, normals: Floats) 
 def _measure_depths(damage: Solid, inner: Flags) -> Floats:
     """Quantiles of how deep a loss is below places all over the skin that it removes."""
     places, _ = sample_by_area(damage, PLACES, np.random.default_rng(0), np.flatnonzero(~inner))
-    return np.asarray(np.quantile(distance_to_mesh(places, Mesh(damage.vertices, damage.faces[inner])), QUANTILES))
+    return np.asarray(np.quantile(distance_to_mesh(places, take_inner_surface(damage, inner)), QUANTILES))
 
 
 def measure_lowered(adapted: AdaptedPart | None, damage: Solid, reach: float) -> float:

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Mesh, Part, Solid
+from damageest.artefacts import Flags, Floats, Ints, Part, Solid
 from damageest.findings import Coverage
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.edges import pair_faces
 from damageest.geometry.neighbourhoods import find_neighbours
-from damageest.geometry.skin import find_inner_faces
+from damageest.geometry.skin import find_inner_faces, take_lost_skin
 
 OPPOSITE = -0.5
 """Cosine between two normals below which they belong to two sides of a wall."""
@@ -42,7 +42,7 @@ def find_unseen_beside(coverage: Coverage, damage: Solid, inner: Flags, reach: f
     near = np.flatnonzero((coverage.region >= 0) & ((centres > low) & (centres < high)).all(axis=1))
     if not len(near) or inner.all():
         return np.empty(0, dtype=np.int64)
-    near = near[distance_to_mesh(centres[near], Mesh(damage.vertices, damage.faces[~inner])) < reach]
+    near = near[distance_to_mesh(centres[near], take_lost_skin(damage, inner)) < reach]
     return np.asarray(near[face_alike(centres[near], coverage.skin.face_normals[near], damage, inner)])
 
 
@@ -51,7 +51,7 @@ def face_alike(places: Floats, normals: Floats, damage: Solid, inner: Flags) -> 
     they face as the nearest skin that it removes. ``inner`` (F,): which of its faces are inside the part."""
     if inner.all() or not len(places):
         return np.zeros(len(places), bool)
-    lost = Mesh(damage.vertices, damage.faces[~inner])
+    lost = take_lost_skin(damage, inner)
     _, face, _ = closest_on_mesh(places, lost)
     return np.asarray(np.einsum("ij,ij->i", normals, lost.face_normals[face]) > OPPOSITE)
 

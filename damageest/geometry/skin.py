@@ -6,7 +6,7 @@ from weakref import ReferenceType, WeakKeyDictionary, ref
 
 import numpy as np
 
-from damageest.artefacts import Flags, Part, Solid, Surface
+from damageest.artefacts import Flags, Mesh, Part, Solid, Surface
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.duplicates import list_used
 
@@ -16,6 +16,8 @@ CLEARLY_OFF = 1e-5
 """Distance, in diagonals of the part, from which a corner is clearly off the skin."""
 _FOUND: WeakKeyDictionary[Solid, tuple[ReferenceType[Part], Flags]] = WeakKeyDictionary()
 """What was found before: evidence, uncertainty and result ask it of the same solids."""
+_TAKEN: WeakKeyDictionary[Solid, dict[bool, tuple[Flags, Mesh]]] = WeakKeyDictionary()
+"""The faces inside the part, and the others, with what tells them apart."""
 
 
 def find_inner_faces(damage: Solid, part: Part) -> Flags:
@@ -40,6 +42,25 @@ def find_inner_faces(damage: Solid, part: Part) -> Flags:
     inner.flags.writeable = False
     _FOUND[damage] = ref(part), inner
     return inner
+
+
+def take_lost_skin(damage: Solid, inner: Flags) -> Mesh:
+    """The skin that a damage volume removes, on its own vertices. ``inner`` (F,): as `find_inner_faces` gives it.
+
+    It is the same mesh each time, so that what is prepared for it, as the tree of its triangles, is prepared once."""
+    return _take(damage, inner, False)
+
+
+def take_inner_surface(damage: Solid, inner: Flags) -> Mesh:
+    """As `take_lost_skin`, for the faces of a damage volume inside the part."""
+    return _take(damage, inner, True)
+
+
+def _take(damage: Solid, inner: Flags, which: bool) -> Mesh:
+    known = _TAKEN.setdefault(damage, {})
+    if which not in known or known[which][0] is not inner:
+        known[which] = inner, Mesh(damage.vertices, damage.faces[inner == which])
+    return known[which][1]
 
 
 def extract_ids(damage: Solid, part: Part) -> Surface:

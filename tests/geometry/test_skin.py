@@ -7,7 +7,7 @@ import pytest
 from manifold3d import Manifold
 
 from damageest.artefacts import Part
-from damageest.geometry.skin import extract_ids, find_inner_faces
+from damageest.geometry.skin import extract_ids, find_inner_faces, take_inner_surface, take_lost_skin
 from damageest.geometry.solids import to_manifold, to_solid
 from tests.geometry.shapes import FAR, box
 
@@ -35,6 +35,17 @@ def test_faces_that_touch_the_skin_along_an_edge_are_inside(away: np.ndarray) ->
     # three sides of the corner lie on the skin, three inside
     assert np.array_equal(inner, corner.cross.sum(axis=1) < 0)
     assert extract_ids(corner, Part(part.vertices, part.faces)).area == pytest.approx(3 * 16)
+
+
+def test_the_two_sides_of_a_damage_are_taken_once() -> None:
+    part, corner = box(10), box(4, np.array([3.0, 3.0, 3.0]))
+    inner = find_inner_faces(corner, Part(part.vertices, part.faces))
+    skin, floor = take_lost_skin(corner, inner), take_inner_surface(corner, inner)
+    assert skin.area == floor.area == pytest.approx(3 * 16)
+    assert take_lost_skin(corner, inner) is skin
+    assert take_inner_surface(corner, inner) is floor
+    assert take_lost_skin(corner, ~inner).area == pytest.approx(3 * 16)
+    assert np.array_equal(take_lost_skin(corner, ~inner).faces, floor.faces), "what tells them apart may be another"
 
 
 def test_what_was_found_for_one_part_is_not_taken_for_another() -> None:
