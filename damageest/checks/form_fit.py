@@ -10,9 +10,8 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.checks.form_fields import Field, FieldFrame
 from damageest.geometry.distance import SurfaceTree, keep_tree
-from damageest.geometry.duplicates import group_integers
+from damageest.geometry.patches import Patches
 from damageest.geometry.transforms import make_motions, move_points
-from damageest.geometry.voxels import number_faced_cubes
 
 FEWEST = 3
 """Points in a cell, for its mean to count."""
@@ -137,7 +136,7 @@ def find_feet(skin: Skin, form: Form, points: Floats, edge: float, reach: float,
     over, places, normals, _ = skin.find_over(back, reach, tolerance)
     if not over.any():
         return Feet(points[over], places, normals, np.empty(0, np.int64))
-    return Feet(points[over], places, normals, group_integers(number_faced_cubes(places, normals, edge)[1])[1])
+    return Feet(points[over], places, normals, Patches.on_skin(places, normals, edge).group)
 
 
 def weigh(offset: Floats, width: float, is_one_sided: bool = False) -> Floats:

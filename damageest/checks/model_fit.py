@@ -13,8 +13,8 @@ from damageest.checks.form_fit import Form
 from damageest.checks.form_words import describe_fit
 from damageest.checks.view_fit import ViewFits
 from damageest.findings import Deformed, ModelFit, PatchDeviation
+from damageest.geometry.patches import Patches
 from damageest.geometry.transforms import remove_rigid
-from damageest.geometry.voxels import number_faced_cubes
 
 SIZES = (20.0, 50.0, 100.0)
 """Widths of patches of skin, in tolerances."""
@@ -200,14 +200,12 @@ def _measure_patches(
     intact = np.abs(left) < INTACT * tolerance
     places, normals, offset, left = feet.places[intact], feet.normals[intact], offset[intact], left[intact]
     for size in SIZES:
-        number = number_faced_cubes(places, normals, size * tolerance)[1]
-        patch = np.unique(number, return_inverse=True)[1]
-        count = np.bincount(patch).astype(np.float64)
-        many = count >= FEWEST_POINTS
+        patches = Patches.on_skin(places, normals, size * tolerance)
+        many = patches.count >= FEWEST_POINTS
         if many.sum() < FEWEST_PATCHES:
             continue
-        means = [(np.bincount(patch, values) / count)[many] for values in (offset, left)]
-        by_noise = float(noise / np.sqrt(np.median(count[many])))
+        means = [patches.mean(values)[many] for values in (offset, left)]
+        by_noise = float(noise / np.sqrt(np.median(patches.count[many])))
         found.append(PatchDeviation(size * tolerance, _measure_spread(means[0]), by_noise, _measure_spread(means[1])))
         waviness = max(waviness, _measure_waviness(means[1], by_noise))
     return tuple(found), waviness

@@ -12,9 +12,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from damageest.artefacts import INTACT, Flags, Floats, FreeMotion
-from damageest.geometry.duplicates import group_integers
+from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
-from damageest.geometry.voxels import number_faced_cubes
 
 PATCH = 1 / 15
 """Edge of a patch of skin, in diagonals of the part."""
@@ -200,20 +199,13 @@ def _average_patches(
         return np.empty(0), np.empty((0, 3)), np.empty((0, 6)), np.empty(0), np.empty(0)
     normals = field.find_normals(index)
     places = field.points[index] - centre
-    _, number = number_faced_cubes(places, normals, edge)
-    _, group, count = group_integers(number)
-    rows = make_rows(places, normals)
-    mean = np.bincount(group, weights=field.distance[index]) / count
-    height = np.bincount(group, weights=np.einsum("ij,ij->i", places, normals)) / count
-    mean_places, mean_rows = (
-        np.stack([np.bincount(group, weights=column) for column in values.T], axis=1) / count[:, None]
-        for values in (places, rows)
+    patches = Patches.on_skin(places, normals, edge)
+    enough: Flags = patches.count >= FEWEST_POINTS
+    height = np.einsum("ij,ij->i", places, normals)
+    mean, mean_places, mean_rows, mean_height = (
+        patches.mean(values)[enough] for values in (field.distance[index], places, make_rows(places, normals), height)
     )
-    enough: Flags = count >= FEWEST_POINTS
-    return (
-        mean[enough], mean_places[enough], mean_rows[enough], height[enough],
-        step * count[enough].astype(np.float64),
-    )  # fmt: skip
+    return mean, mean_places, mean_rows, mean_height, step * patches.count[enough].astype(np.float64)
 
 
 def _measure_excess(left: Floats, variance: Floats) -> float:

@@ -12,10 +12,9 @@ import numpy as np
 from damageest.artefacts import INTACT, Floats, Scan
 from damageest.checks.pose_error import PoseError
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
-from damageest.geometry.duplicates import group_integers
 from damageest.geometry.noise import find_least_depth
+from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
-from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
 """Edge of a patch in spacings: about sixteen points on a face."""
@@ -43,9 +42,9 @@ def measure_levels(field: ScanField) -> tuple[NoiseLevel, ...]:
     index = index[:: max(1, -(-len(index) // MOST_POINTS))]
     normals, distance = field.find_normals(index), field.distance[index]
     edge = EDGE * aligned.spacing * float(np.sqrt(max(1.0, len(aligned.points) / MOST_POINTS)))
-    _, group, count = group_integers(number_faced_cubes(aligned.points[index], normals, edge)[1])
-    mean = np.bincount(group, weights=distance) / count
-    square = (distance - mean[group]) ** 2 * (count / np.maximum(count - 1, 1))[group]
+    patches = Patches.on_skin(aligned.points[index], normals, edge)
+    group, count = patches.group, patches.count
+    square = (distance - patches.mean(distance)[group]) ** 2 * (count / np.maximum(count - 1, 1))[group]
     told = (count >= FEWEST_POINTS)[group] & (aligned.view[index] >= 0)
     if told.sum() < FEWEST_OF_LEVEL:
         return ()

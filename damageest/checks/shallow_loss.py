@@ -6,10 +6,9 @@ import numpy as np
 
 from damageest.artefacts import ADDED
 from damageest.checks.site_error import WIDTH
-from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import measure_local_areas
+from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
-from damageest.geometry.voxels import number_faced_cubes
 
 EDGE = 4.0
 """Edge of a patch, in point spacings: about sixteen points on a face."""
@@ -31,9 +30,9 @@ def limit_shallow_loss(field: ScanField, least_width: float = 0.0) -> float:
     points, distance, aligned = field.points[index], field.distance[index], field.aligned
     area = measure_local_areas(points)
     edge = EDGE * max(aligned.spacing, 1e-6 * field.part.diagonal)
-    patch, count = group_integers(number_faced_cubes(points, field.find_normals(index), edge)[1])[1:]
-    size = np.bincount(patch, weights=area)
-    mean = np.bincount(patch, weights=distance) / count
-    noise = aligned.noise / np.sqrt(count)
+    patches = Patches.on_skin(points, field.find_normals(index), edge)
+    size = np.bincount(patches.group, weights=area)
+    mean = patches.mean(distance)
+    noise = aligned.noise / np.sqrt(patches.count)
     depth = np.where(mean < -WIDTH * noise, np.minimum(-2 * mean, field.tolerance), 0.0)
     return float(size @ depth + WIDTH * np.linalg.norm(size * noise) + narrow)

@@ -14,9 +14,9 @@ from damageest.checks.view_joint import JointFit, ViewPoints, fit_jointly
 from damageest.findings import ViewFit
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import pick_one_per_cube
+from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points
-from damageest.geometry.voxels import number_faced_cubes
 
 COMPARED = 30_000
 """Points that views are compared with, in all."""
@@ -234,7 +234,7 @@ def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tol
     distance, places, normals = skin.find_feet(points)
     offset = np.einsum("ij,ij->i", normals, points - places)
     used = (distance < REACH * tolerance) & (np.abs(np.abs(offset) - distance) < 0.1 * tolerance)
-    cell = np.unique(number_faced_cubes(places[used], normals[used], 5 * gap)[1], return_inverse=True)[1]
+    cell = Patches.on_skin(places[used], normals[used], 5 * gap).group
     cells = int(cell.max(initial=-1)) + 1
     total = np.bincount(cell * count + view[used], minlength=cells * count).reshape(-1, count).astype(np.float64)
     sums = np.bincount(cell * count + view[used], offset[used], cells * count).reshape(-1, count)

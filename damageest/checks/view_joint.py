@@ -13,8 +13,8 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.checks.form_fields import FieldFrame
 from damageest.checks.form_fit import FEWEST, LARGEST, Skin, make_motion, weigh
-from damageest.geometry.duplicates import group_integers
-from damageest.geometry.voxels import number_cubes, number_faced_cubes
+from damageest.geometry.patches import Patches
+from damageest.geometry.voxels import number_cubes
 
 WIDTHS = (8.0, 5.0, 3.0, 1.5, 0.7, 0.0)
 """Widths of the kernel, in tolerances, one after the other."""
@@ -109,17 +109,13 @@ def pair_views(skin: Skin, frame: FieldFrame, seen: ViewPoints, gap: float, reac
     if not len(points):
         none = np.empty(0, np.int64)
         return Pairs(none, none, none, np.empty(0), np.empty((0, 6)), np.empty(0), np.empty(0, bool))
-    cell = number_faced_cubes(places, normals, PER_CELL * gap)[1]
-    patch = number_cubes(places, PER_PATCH * gap)[1]
-    cell = np.unique(cell, return_inverse=True)[1]
-    count = int(view.max()) + 1
-    first, pair, _ = group_integers(cell * count + view)
-    size = np.bincount(pair).astype(np.float64)
+    cells = Patches.on_skin(places, normals, PER_CELL * gap)
+    of_views = cells.split(view)
     rows = np.concatenate([offset[:, None], frame.list_motions(points, normals)], axis=1)
-    means = np.stack([np.bincount(pair, column) for column in rows.T], axis=1) / size[:, None]
-    many = size >= FEWEST
-    cell, view, patch = (one[first][many] for one in (cell, view, patch))
-    means, size = means[many], size[many]
+    many = of_views.count >= FEWEST
+    numbers = (cells.group, view, number_cubes(places, PER_PATCH * gap)[1])
+    cell, view, patch = (one[of_views.first][many] for one in numbers)
+    means, size = of_views.mean(rows)[many], of_views.count[many].astype(np.float64)
     shared = np.bincount(cell)[cell] > 1 if len(cell) else np.empty(0, bool)
     return Pairs(cell, view, patch, means[:, 0], means[:, 1:], size, shared)
 

@@ -9,8 +9,8 @@ import numpy as np
 from damageest.artefacts import INTACT, Floats, Ints
 from damageest.checks.view_fit import number_views
 from damageest.geometry.neighbourhoods import find_in_box
+from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
-from damageest.geometry.voxels import number_faced_cubes
 
 AGREE = 0.6
 """Difference of the views, in tolerances, in four fifths of their overlap, up to which they agree."""
@@ -81,10 +81,8 @@ def _average(field: ScanField, view: Ints, used: Ints, edge: float) -> _Means:
     some."""
     if not len(used):
         return _Means(np.empty(0, np.int64), np.empty(0), np.empty(0))
-    number = number_faced_cubes(field.points[used], field.find_normals(used), edge)[1]
-    cube = np.unique(number, return_inverse=True)[1]
-    count = int(view.max()) + 1
-    pair, group, size = np.unique(cube * count + view[used], return_inverse=True, return_counts=True)
-    mean = np.bincount(group, weights=field.distance[used]) / size
-    many = size >= FEWEST_OF_VIEW
-    return _Means(pair[many] // count, mean[many], size[many].astype(np.float64))
+    cubes = Patches.on_skin(field.points[used], field.find_normals(used), edge)
+    of_views = cubes.split(view[used])
+    many = of_views.count >= FEWEST_OF_VIEW
+    mean = of_views.mean(field.distance[used])
+    return _Means(cubes.group[of_views.first][many], mean[many], of_views.count[many].astype(np.float64))

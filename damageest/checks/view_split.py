@@ -23,8 +23,9 @@ from damageest.checks.view_fit import (
 )
 from damageest.checks.view_joint import PER_CELL, PER_PATCH, deal_patches
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
-from damageest.geometry.voxels import number_cubes, number_faced_cubes
+from damageest.geometry.voxels import number_cubes
 
 ASKED, LEAST_POINTS = 40_000, 1000
 """Points that are asked, and points below which nothing is separated."""
@@ -78,7 +79,7 @@ class _Points:
         if not over.any():
             return cls(index, offset, rows, index, index)
         gap = float(np.sqrt(part.area / COMPARED))
-        cell = group_integers(number_faced_cubes(places, normals, PER_CELL * gap)[1])[1]
+        cell = Patches.on_skin(places, normals, PER_CELL * gap).group
         return cls(index, offset, rows, cell, number_cubes(places, PER_PATCH * gap)[1])
 
 
@@ -207,10 +208,10 @@ def _is_sorted(offset: Floats, cell: Ints, cut: int, compared: Flags, width: flo
     are sorted along an axis, on a face across it. They lie apart since they were sorted."""
     order = np.arange(len(offset), dtype=np.float64)
     used = compared[cell]
-    group = group_integers(2 * cell[used] + (order[used] >= cut))[1]
-    count = np.bincount(group)
+    halves = Patches.of_equal(2 * cell[used] + (order[used] >= cut))
+    group, count = halves.group, halves.count
     values = [np.clip(offset[used], -10 * width, 10 * width), order[used]]
-    left = [one - (np.bincount(group, one) / count)[group] for one in values]
+    left = [one - halves.mean(one)[group] for one in values]
     # each cell counts by its own correlation: positions in the file differ by far more in some
     product, squares = np.bincount(group, left[0] * left[1]), [np.bincount(group, one**2) for one in left]
     each = product / np.sqrt(np.maximum(squares[0] * squares[1], 1e-300))

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.duplicates import group_integers
 from damageest.geometry.neighbourhoods import make_tree, query_at_few
-from damageest.geometry.voxels import number_cubes
+from damageest.geometry.patches import Patches
 
 MOST = 64
 """Points of a stack up to which it is recognised."""
@@ -60,10 +59,10 @@ def _group_within(points: Floats, reach: float) -> Ints:
     from scipy.sparse.csgraph import connected_components
 
     low = points.min(axis=0)
-    _first, cube, counts = group_integers(number_cubes(points - low, reach / 2)[1])
-    means = np.stack([np.bincount(cube, points[:, axis] - low[axis]) for axis in range(3)], axis=1) / counts[:, None]
+    cubes = Patches.in_cubes(points - low, reach / 2)
+    means = cubes.mean(points - low)
     pairs = make_tree(means).query_pairs(reach, output_type="ndarray")
     links = coo_array((np.ones(len(pairs), bool), pairs.T), shape=(len(means), len(means)))
-    label = connected_components(links, directed=False)[1][cube]
+    label = connected_components(links, directed=False)[1][cubes.group]
     order = np.unique(label, return_index=True)[1].argsort().argsort()
     return np.asarray(order[label], np.int64)

@@ -34,6 +34,7 @@ from damageest.geometry import (
     noise,
     open_surfaces,
     orientation,
+    patches,
     pieces,
     pieces_of_part,
     point_pieces,
@@ -336,6 +337,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "units.question_size": lambda r: units.question_size(0.1, r.points, "mm") and None,
     "units.diagnose_size": lambda r: units.diagnose_size(r.points, "mm") and None,
     "scan_field.ScanField": lambda r: expect(scan_field.ScanField.measure(r.part, r.scan, 0.1).feet, (r.count, 3)),
+    "patches.Patches": lambda r: expect(patches.Patches.on_skin(r.points, r.normals, 0.5).mean(r.points), (None, 3)),
     "vectors.cross_corners": lambda r: expect(vectors.cross_corners(r.mesh.triangles), (len(r.mesh.faces), 3)),
     "vectors.measure_longest_edges": lambda r: expect(
         vectors.measure_longest_edges(r.mesh.triangles), (len(r.mesh.faces),)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.duplicates import group_integers
+from damageest.geometry.patches import Patches
 from damageest.geometry.threads import count_threads
-from damageest.geometry.voxels import number_cubes
 from damageest.isolation.memory import FEWER_POINTS, require_memory
 
 MAX_PAIRS = 20_000_000
@@ -72,6 +71,5 @@ def measure_neighbour_distances(points: Floats, neighbours: int) -> Floats:
 def _gather_in_cells(points: Floats, cell: float) -> tuple[Floats, Ints, Ints]:
     """Averages points in cells of a grid: the mean points, the cell of each point, the number of points of each
     cell."""
-    _, of, count = group_integers(number_cubes(points, cell)[1])
-    means = np.stack([np.bincount(of, points[:, axis]) for axis in range(3)], axis=1) / count[:, None]
-    return means, of, count
+    cubes = Patches.in_cubes(points, cell)
+    return cubes.mean(points), cubes.group, cubes.count

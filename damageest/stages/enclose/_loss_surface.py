@@ -5,11 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats, Ints
-from damageest.geometry.duplicates import group_integers
 from damageest.geometry.local_fits import average_points
 from damageest.geometry.neighbourhoods import measure_local_areas, pick_one_per_cube, thin_points
 from damageest.geometry.orientation import turn_toward_void
-from damageest.geometry.voxels import number_cubes
+from damageest.geometry.patches import Patches
 from damageest.stages.enclose._fill_gaps import fill_gaps
 
 OrientedPoints = tuple[Floats, Floats, Floats]
@@ -60,9 +59,9 @@ def _thin_flat(points: Floats, chosen: Ints, counts: Ints, depth: Floats, noise:
     Flat are cubes of `FLAT_CUBE` cells in which the points (N,3) lie on a plane within their noise. Each is the mean
     of ``counts`` (N,) scan points.
     """
-    _, cube, size = group_integers(number_cubes(points, FLAT_CUBE * cell)[1])
-    mean = np.stack([np.bincount(cube, points[:, axis]) for axis in range(3)], axis=1) / size[:, None]
-    off = points - mean[cube]
+    cubes = Patches.in_cubes(points, FLAT_CUBE * cell)
+    cube, size = cubes.group, cubes.count
+    off = points - cubes.mean(points)[cube]
     moments = np.stack([np.bincount(cube, off[:, i] * off[:, j]) for i in range(3) for j in range(3)], axis=1)
     variance = np.linalg.eigvalsh(moments.reshape(-1, 3, 3) / size[:, None, None])[:, 0]
     expected = noise**2 * np.bincount(cube, 1 / counts) / size

@@ -14,6 +14,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
 from damageest.geometry.duplicates import group_integers
+from damageest.geometry.patches import Patches
 from damageest.geometry.threads import count_threads
 from damageest.geometry.voxels import CHUNK, number_cubes, number_faced_cubes
 from damageest.isolation.memory import FEWER_POINTS, require_memory
@@ -115,8 +116,8 @@ def _average_cubes(points: Floats, normals: Floats, depth: Floats, edge: float) 
         (C,) of its points.
     """
     cell, key = number_faced_cubes(points, normals, edge)
-    first, group, count = group_integers(key)
-    return cell[first], group, np.bincount(group, weights=depth) / count, count
+    cubes = Patches.of_equal(key)
+    return cell[cubes.first], cubes.group, cubes.mean(depth), cubes.count
 
 
 def _measure_remaining(mean: Floats, count: Ints, noise: float) -> float:
