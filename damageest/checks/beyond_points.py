@@ -12,11 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Part, Solid
+from damageest.artefacts import Flags, Floats, Solid
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.edges import pair_faces
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces, take_lost_skin
 from damageest.rules.beyond_points import ASKED, CONTRADICTED
 
@@ -53,17 +54,15 @@ class BeyondPoints:
         return self.share > CONTRADICTED
 
 
-def ask_beyond_points(
-    solid: Solid, part: Part, own: Floats, points: Floats, noise: float, gap: float, tolerance: float, unit: str
-) -> BeyondPoints:
+def ask_beyond_points(solid: Solid, field: ScanField, own: Floats, unit: str) -> BeyondPoints:
     """How much of a volume its scan points do not show.
 
     Args:
         solid: a damage volume, or added metal, one piece or more.
-        own: (M,3) the scan points on it; points: (N,3) the whole scan; both in the part's frame.
-        gap: the spacing of the scan. noise, gap and tolerance are in the job's ``unit``.
+        own: (M,3) the scan points on it, in the part's frame. field: that of the whole scan, in the job's ``unit``.
     """
-    inner = find_inner_faces(solid, part)
+    noise, gap, tolerance = field.aligned.noise, field.aligned.spacing, field.tolerance
+    inner = find_inner_faces(solid, field.part)
     if not len(own) or inner.all() or not inner.any():
         return BeyondPoints()
     volume = solid.volume
@@ -71,7 +70,7 @@ def ask_beyond_points(
     skin = take_lost_skin(solid, inner)
     depth = float(distance_to_mesh(own[:: max(1, len(own) // MOST)], skin).max())
     behind, before, bare = _compare_with_points(
-        solid, inner, points, 2 * max(gap, tolerance), BARE * max(gap, tolerance)
+        solid, inner, field.points, 2 * max(gap, tolerance), BARE * max(gap, tolerance)
     )
     slack = NOISES * noise + GAPS * gap
     each = float(area[inner].sum()) / len(behind)

@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Ints, Part, Scan
+from damageest.artefacts import Flags, Floats, Ints, Part
 from damageest.checks.skin_cells import SkinCells
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.rays import Crossings, RayCaster, prepare_rays
+from damageest.geometry.scan_field import ScanField
 
 MOST_RAYS = 100_000
 """Scan points whose rays are followed through the part."""
@@ -32,13 +33,12 @@ class RayEvidence:
     outside: Flags
 
 
-def trace_rays(
-    part: Part, cells: SkinCells, seen: Flags, perhaps_seen: Flags, aligned: Scan, tolerance: float
-) -> RayEvidence | None:
+def trace_rays(field: ScanField, cells: SkinCells, seen: Flags, perhaps_seen: Flags) -> RayEvidence | None:
     """Follows the scanner's rays through the part as designed. None where no scanner position is known.
 
     Cells that are not ``seen`` (F,) are explained; only those that are not ``perhaps_seen`` (F,) can be proven lost.
     """
+    part, aligned, tolerance = field.part, field.aligned, field.tolerance
     if aligned.viewpoints is None or aligned.view is None or not (aligned.view >= 0).any():
         return None
     used = np.flatnonzero(aligned.view >= 0)

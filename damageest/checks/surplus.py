@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from damageest.artefacts import Floats, Ints, Part, Scan, Sites, Solid
+from damageest.artefacts import Floats, Ints, Part, Sites, Solid
 from damageest.checks.beyond_points import ask_beyond_points
 from damageest.findings import Surplus
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
@@ -76,19 +76,18 @@ def describe_surplus(clusters: Sites, losses: Sites, field: ScanField) -> tuple[
 
     ``losses``: the clusters of damaged points.
     """
-    part, aligned = field.part, field.aligned
-    cell = max(field.tolerance, 1.5 * aligned.spacing)
+    cell = max(field.tolerance, 1.5 * field.aligned.spacing)
     found: list[Surplus] = []
     if not clusters.count:
         return ()
-    patches = {k: _measure_patch(aligned, part, losses.members(k), cell) for k in range(1, losses.count + 1)}
+    patches = {k: _measure_patch(field, losses.members(k), cell) for k in range(1, losses.count + 1)}
     for number in range(1, clusters.count + 1):
         members = clusters.members(number)
-        patch = _measure_patch(aligned, part, members, cell)
+        patch = _measure_patch(field, members, cell)
         surplus = Surplus(
             id=number,
             points=members,
-            share=len(members) / len(aligned.points),
+            share=len(members) / len(field.points),
             solid=None,
             height=float(field.distance[members].max()),
             area=patch.covered,
@@ -124,22 +123,20 @@ def join_surplus(items: Sequence[Surplus]) -> Surplus:
     )
 
 
-def close_surplus(
-    surplus: Surplus, solid: Solid, aligned: Scan, part: Part, tolerance: float, unit: str
-) -> Surplus | None:
+def close_surplus(surplus: Surplus, solid: Solid, field: ScanField, unit: str) -> Surplus | None:
     """The surplus with its volume and the skin that it covers; None where its points are not on the solid's surface.
 
     A note says so where much of the solid's surface has no scan points. Without a solid where the solid holds more than
     its points show; a note says how much.
     """
-    points = aligned.points[surplus.points]
-    beyond = ask_beyond_points(solid, part, points, aligned.points, aligned.noise, aligned.spacing, tolerance, unit)
+    aligned, tolerance, points = field.aligned, field.tolerance, field.points[surplus.points]
+    beyond = ask_beyond_points(solid, field, points, unit)
     if beyond.is_contradicted:
         return replace(surplus, notes=(*surplus.notes, f"its volume is not known: {beyond.reason}"))
     points = points[:: max(1, len(points) // 5000)]
     if float(np.quantile(distance_to_mesh(points, solid), 0.95)) > 3 * tolerance + aligned.spacing:
         return None
-    outer = find_inner_faces(solid, part)
+    outer = find_inner_faces(solid, field.part)
     area = solid.face_areas
     notes = (*surplus.notes, *([beyond.reason] if beyond.reason else []))
     if outer.any():
@@ -187,14 +184,14 @@ def _name_kind(surplus: Surplus, patch: _Patch, losses: dict[int, _Patch], field
     return replace(surplus, kind="displaced piece", clusters=clusters, notes=(note,))
 
 
-def _measure_patch(aligned: Scan, part: Part, members: Ints, cell: float) -> _Patch:
-    points = aligned.points[members]
+def _measure_patch(field: ScanField, members: Ints, cell: float) -> _Patch:
+    points = field.points[members]
     fine, kept = cell / 2, points[pick_one_per_cube(points, cell / 2)]
     while len(kept) > MOST:
         fine *= 1.5
         kept = kept[pick_one_per_cube(kept, fine)]
     points, cell = kept, 2 * fine
-    distance, _, feet = closest_on_mesh(points, part)
+    distance, _, feet = closest_on_mesh(points, field.part)
     return _Patch(points, feet, measure_area(points, cell), measure_area(feet, cell), float(distance.mean()))
 
 

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Scan, Solid
+from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Solid
 from damageest.checks.beyond_points import BeyondPoints
 from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface
 from damageest.checks.pose_error import PoseError
@@ -22,6 +22,7 @@ from damageest.geometry.edges import pair_faces
 from damageest.geometry.lost_depth import LostDepth
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.geometry.sampling import sample_by_area
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import take_inner_surface
 from damageest.rules import ScanFacts
 from damageest.rules.inner_surface import GAP
@@ -90,9 +91,13 @@ class _Place(NamedTuple):
 
 
 def measure_site_error(
-    loss: Loss, part: Part, aligned: Scan, errors: ScanErrors, form: float, free: Sequence[FreeMotion],
+    loss: Loss,
+    field: ScanField,
+    errors: ScanErrors,
+    form: float,
+    free: Sequence[FreeMotion],
     adapted: AdaptedPart | None,
-) -> SiteError | None:  # fmt: skip
+) -> SiteError | None:
     """The errors of one site; None where no scan point lies on its inner surface.
 
     Args:
@@ -100,6 +105,7 @@ def measure_site_error(
             gives it; where it is less than what the intact skin shows, the latter counts.
         free: motions that the scan does not exclude.
     """
+    part, aligned = field.part, field.aligned
     damage, inner, points, evidence, beyond = loss.damage, loss.inner, loss.points, loss.evidence, loss.beyond
     pose, scan, scanner, tolerance = errors.pose, errors.facts, errors.scanner, errors.facts.tolerance
     surface = measure_inner_surface(damage, inner, points, aligned.noise, aligned.spacing, tolerance)

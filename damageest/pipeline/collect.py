@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Part, Pose, Scan, Solid
+from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
 from damageest.checks.budget import UNKNOWN
 from damageest.geometry.remaining import subtract_from_part
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import extract_ids
 from damageest.geometry.solids import iou, to_solid, unite
 from damageest.geometry.transforms import move_points
@@ -25,8 +26,8 @@ from damageest.rules.notes import make_notes, rank_notes
 @step(
     gives="result",
     reads=(
-        "name", "unit", "tolerance", "part", "scan", "aligned", "pose", "deviation", "sites", "found", "failures",
-        "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
+        "name", "unit", "tolerance", "part", "scan", "aligned", "field", "pose", "deviation", "sites", "found",
+        "failures", "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
         "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre", "samples",
     ),
 )  # fmt: skip
@@ -35,7 +36,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
     if state.failures and not state.found:
         raise state.failures[0]
     part, scan, deviation = state.part, state.scan, state.deviation
-    sites = tuple(_describe_site(site, part, state.aligned) for site in state.found)
+    sites = tuple(_describe_site(site, state.field) for site in state.found)
     label = np.zeros(len(scan.points), np.int32)
     for site in sites:
         label[site.points] = site.id
@@ -86,7 +87,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
     )
 
 
-def _describe_site(found: FoundSite, part: Part, aligned: Scan) -> Site:
+def _describe_site(found: FoundSite, field: ScanField) -> Site:
     evidence, members = found.evidence, found.members
     warnings = make_notes("enclose", found.notes)
     deposit, damage, enclosures = found.deposit, found.damage, found.enclosures
@@ -103,7 +104,7 @@ def _describe_site(found: FoundSite, part: Part, aligned: Scan) -> Site:
         clusters=found.clusters,
         points=members,
         damage=damage,
-        surface=extract_ids(damage, part),
+        surface=extract_ids(damage, field.part),
         deposit=deposit,
         refused=found.refused,
         verdict=found.verdict,
@@ -114,7 +115,7 @@ def _describe_site(found: FoundSite, part: Part, aligned: Scan) -> Site:
         path=path,
         method=found.method,
         evidence=evidence,
-        max_depth=found.measure_depth(part, aligned),
+        max_depth=found.measure_depth(field),
         warnings=warnings,
     )
 

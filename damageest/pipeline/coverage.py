@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from damageest.artefacts import DAMAGE, INTACT, Deviation, Part, Scan
+from damageest.artefacts import DAMAGE, INTACT, Deviation
 from damageest.checks.coverage import SkinView, measure_coverage
 from damageest.checks.facing import find_turned
 from damageest.checks.ray_evidence import trace_rays
@@ -23,14 +23,13 @@ def inspect_skin(field: ScanField, segmenter: Segment | None) -> tuple[SkinView,
     """Maps what the scan shows of the skin, and labels as damage the points that lie on no skin: those that face
     another way, and those that rays reached through lost metal. Raises StageError where too few points near the part
     are intact."""
-    part, aligned, tolerance = field.part, field.aligned, field.tolerance
     _check_intact(field, segmenter)
     label = field.label.copy()
     label[find_turned(field)] = DAMAGE
     deviation = replace(field.deviation, label=label)
-    cells = cut_skin(part, aligned.spacing)
+    cells = cut_skin(field.part, field.aligned.spacing)
     seen, perhaps_seen, distance = find_seen(cells, replace(field, deviation=deviation))
-    rays = trace_rays(part, cells, seen, perhaps_seen, aligned, tolerance)
+    rays = trace_rays(field, cells, seen, perhaps_seen)
     if rays is not None:
         rooted = deviation.label.copy()
         rooted[rays.roots[rooted[rays.roots] == INTACT]] = DAMAGE
@@ -47,8 +46,7 @@ def _check_intact(field: ScanField, segmenter: Segment | None) -> None:
 
 
 @step(gives="coverage")
-def describe_coverage(
-    part: Part, skin: SkinView, found: tuple[FoundSite, ...], tolerance: float, aligned: Scan
-) -> Coverage:
+def describe_coverage(field: ScanField, skin: SkinView, found: tuple[FoundSite, ...]) -> Coverage:
     """Measures the share of the skin that the scan shows, and describes the rest."""
-    return measure_coverage(part, skin, [site.damage for site in found], tolerance, aligned.spacing)
+    losses = [site.damage for site in found]
+    return measure_coverage(field.part, skin, losses, field.tolerance, field.aligned.spacing)

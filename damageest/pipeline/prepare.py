@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Deviation, Part, Pose, Reason, Scan, Sites
+from damageest.artefacts import Part, Pose, Reason, Scan, Sites
 from damageest.checks.scan_quality import (
     check_walls,
     choose_tolerance,
@@ -24,6 +24,7 @@ from damageest.geometry.far_points import find_far
 from damageest.geometry.filled import find_filled
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.pieces_of_part import is_piece
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.units import diagnose_scale, diagnose_size, question_size
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache
@@ -182,9 +183,9 @@ def settle_tolerance(
 
 
 @step()
-def check_clusters(sites: Sites, deviation: Deviation, tolerance: float, part: Part) -> None:
+def check_clusters(sites: Sites, field: ScanField) -> None:
     """Stops with an InputError where noise alone makes very many clusters, before each of them costs an enclosure."""
-    require_real_clusters(sites, deviation, tolerance, part)
+    require_real_clusters(sites, field.deviation, field.tolerance, field.part)
 
 
 def read_part(job: Job, registry: Registry) -> Part:

@@ -90,7 +90,7 @@ ACQUIRE: Route = (
     Segment,  # aligned, part, samples, tolerance -> deviation
     inspect_skin,  # field, segmenter -> skin, deviation
     Cluster,  # aligned, deviation, tolerance -> sites
-    check_clusters,  # sites, deviation, tolerance, part ->
+    check_clusters,  # sites, field ->
     look_for_sheets,  # field -> sheets
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, field, aligned, deviation, tolerance, part, sites,
     #     samples, nearby -> surplus, deviation, +warnings
@@ -125,8 +125,8 @@ CLOSE: Route = (
     complete_sites,  # calls Reconstruct: part, skin, found, failures, sites, field, unit, tolerance, spacing, noise
     #     -> found, failures, +warnings
     choose_sites,  # found, choice, field -> found, +warnings
-    describe_coverage,  # part, skin, found, tolerance, aligned -> coverage
-    relate_surplus,  # surplus, found, aligned, tolerance, unit -> surplus, found, +warnings
+    describe_coverage,  # field, skin, found -> coverage
+    relate_surplus,  # surplus, found, field, unit -> surplus, found, +warnings
     gather_facts,  # field, skin, surplus, sheets, pose, aligner, unit, fitted, adapted -> facts
     measure_sensor,  # field, sites, facts, explained, depth_step, pose, aligner -> pose_error, sensor
     weigh_scanner,  # scanner, temperature, corrected_scale, fitted, field, pose_error, facts, unit
@@ -134,17 +134,17 @@ CLOSE: Route = (
     measure_uncertainty,  # found, part, aligned, field, adapted, skin, coverage, facts, fitted, pose, pose_error,
     #     scanner_errors, tolerance, unit, adapter, warnings -> found
     judge_sites,  # found, accept, rules, facts, field, skin, coverage, pose, unit, views, aligner -> found
-    fold_hidden,  # found, sensor, explained, sheets, aligner, accept, aligned, part, tolerance, asked_tolerance, unit,
-    #     field -> found, folded, +warnings
+    fold_hidden,  # found, sensor, explained, sheets, aligner, accept, tolerance, asked_tolerance, unit, field
+    #     -> found, folded, +warnings
     question_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
     sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, scanner_errors, unit
     #     -> volume_95, budget
-    cut_sections,  # asked_sections, part, aligned, adapted, pose_error, sensor, tolerance, unit -> sections, +warnings
-    collect_result,  # name, unit, tolerance, part, scan, aligned, pose, deviation, sites, found, failures, warnings,
-    #     coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions, sections,
-    #     corrected_scale, thermal_scale, scan_centre, samples -> result
+    cut_sections,  # asked_sections, field, adapted, pose_error, sensor, unit -> sections, +warnings
+    collect_result,  # name, unit, tolerance, part, scan, aligned, field, pose, deviation, sites, found, failures,
+    #     warnings, coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions,
+    #     sections, corrected_scale, thermal_scale, scan_centre, samples -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written

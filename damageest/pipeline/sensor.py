@@ -99,8 +99,7 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
 @step(
     gives=("found", "folded", "warnings"),
     reads=(
-        "found", "sensor", "explained", "sheets", "aligner", "accept", "aligned", "part", "tolerance",
-        "asked_tolerance", "unit", "field",
+        "found", "sensor", "explained", "sheets", "aligner", "accept", "tolerance", "asked_tolerance", "unit", "field",
     ),
 )  # fmt: skip
 def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
@@ -112,7 +111,7 @@ def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]
         return state.found, 0.0, ()
     gone = [site for site in state.found if site.number in causes]
     volume = state.explained.volume + sum(_limit_explained(state, site, causes[site.number]) for site in gone)
-    deepest = max([state.explained.deepest, *(site.measure_depth(state.part, state.aligned) for site in gone)])
+    deepest = max([state.explained.deepest, *(site.measure_depth(state.field) for site in gone)])
     all_causes = {*causes.values(), *(("views",) if state.explained.places else ())}
     told = [_describe_cause(state, cause) for cause in CAUSES if cause in all_causes]
     many, unit = f"{count} places" if count > 1 else "1 place", state.unit
@@ -163,7 +162,7 @@ def _explain(state: JobState, site: FoundSite) -> str:
     """What explains a doubtful site that is no loss, one of `CAUSES`; empty where it may be one."""
     if not _is_folding(state.aligner, state.accept) or site.verdict.level != "doubtful":
         return ""
-    depth = site.measure_depth(state.part, state.aligned)
+    depth = site.measure_depth(state.field)
     if not depth:
         return ""
     against = {reason.code for reason in site.verdict.reasons if reason.effect == "contradicts"}

@@ -208,9 +208,9 @@ class FoundSite(_SiteState):
     built = Value[Solid | None]()
     path = Value[DepositPath | None]()
 
-    def measure_depth(self, part: Part, aligned: Scan) -> float:
+    def measure_depth(self, field: ScanField) -> float:
         """The largest depth of its scan points below the lost skin; 0 without any."""
-        return measure_lost_depth(self.damage, part, aligned.points[self.members])
+        return measure_lost_depth(self.damage, field.part, field.points[self.members])
 
 
 @dataclass(frozen=True, eq=False)

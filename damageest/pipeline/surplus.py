@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Scan, Sites
+from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
 from damageest.checks.two_sheets import FARTHEST
 from damageest.errors import DamageestError, StageError
@@ -15,6 +15,7 @@ from damageest.findings import Surplus
 from damageest.geometry.alike import have_same_shape
 from damageest.geometry.complement import complement_deviation, complement_part, complement_samples, label_strays
 from damageest.geometry.pieces import JoinedPieces, find_pieces, join_pieces
+from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.threads import count_threads
 from damageest.pipeline.engine import Engine
@@ -69,19 +70,19 @@ def find_surplus(engine: Engine, state: JobState) -> tuple[tuple[Surplus, ...], 
 
 @step(gives=("surplus", "found", "warnings"))
 def relate_surplus(
-    surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], aligned: Scan, tolerance: float, unit: str
+    surplus: tuple[Surplus, ...], found: tuple[FoundSite, ...], field: ScanField, unit: str
 ) -> tuple[tuple[Surplus, ...], tuple[FoundSite, ...], Reasons]:
     """Names the surplus beside each site, and says what is to be done about surroundings."""
     sites, done = list(found), []
     warnings: list[Reason] = []
-    reach = max(2 * tolerance, 1.5 * aligned.spacing)
+    reach = max(2 * field.tolerance, 1.5 * field.aligned.spacing)
     for item in surplus:
         beside = [site for site in sites if set(site.clusters) & set(item.clusters)]
         item = compare_with_losses(item, [site.damage.volume for site in beside])
         done.append(item)
         if item.kind == "surroundings":
             continue
-        touching = {site.number for site in beside if _is_touching(aligned.points, item, site, reach)}
+        touching = {site.number for site in beside if _is_touching(field.points, item, site, reach)}
         twins = {site.number for site in sites if site not in beside and _is_twin(item, site)}
         sites = [replace(s, twins=(*s.twins, item.id)) if s.number in twins else s for s in sites]
         covered = (item.id, item.area)
@@ -102,7 +103,7 @@ def relate_surplus(
             sites = [replace(s, displaced=(*s.displaced, item.id)) if s.number in equal else s for s in sites]
             text = f"surplus {item.id}{own} may be a displaced piece" + (f" of {of}" if of else "")
             remedy = "put it back and scan again, or repair the part as if the piece were lost"
-            place = find_place(aligned.points, item.points)
+            place = find_place(field.points, item.points)
             warnings.append(
                 Reason("displaced_piece", text, amount=item.volume, unit=f"{unit}³", place=place, remedy=remedy)
             )
@@ -165,7 +166,7 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
     for piece in pieces:
         own = {tried[number - 1] for number in piece.clusters}
         item = join_surplus([metal[number - 1] for number in sorted(own)])
-        solid = close_surplus(item, piece.damage, turned.aligned, turned.part, turned.tolerance, turned.unit)
+        solid = close_surplus(item, piece.damage, turned.field, turned.unit)
         if solid is not None:
             done.append(solid)
             left = {number: other for number, other in left.items() if number not in own}

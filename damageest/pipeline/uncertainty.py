@@ -146,10 +146,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         return _measure_pore(state, site)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
-    beyond = ask_beyond_points(
-        site.damage, state.part, points, state.aligned.points, state.aligned.noise, state.aligned.spacing,
-        state.tolerance, state.unit,
-    )  # fmt: skip
+    beyond = ask_beyond_points(site.damage, state.field, points, state.unit)
     site = replace(site, beyond=beyond)
     differ = WIDTH * compare_at_site(state.field, site.members, state.skin.cells.edge)
     facts = replace(state.facts, between_views=max(state.facts.between_views, differ))
@@ -159,7 +156,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         ScanErrors(pose, facts, state.scanner_errors),
     )
     form = _measure_form(state, site)
-    found = measure_site_error(loss, state.part, state.aligned, errors, form, state.pose.free, state.adapted)
+    found = measure_site_error(loss, state.field, errors, form, state.pose.free, state.adapted)
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from manifold3d import Manifold
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Scan
 from damageest.checks.beyond_points import BeyondPoints, ask_beyond_points
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.scan_field import ScanField
 from tests.sparse_scenes import GAP, as_part, as_solid, block, pad, pocket, scan
 
 DEPTH, TOLERANCE = 0.35, 0.15
@@ -20,7 +21,11 @@ def ask(volume: Any, lost: Any, points: Floats | None = None) -> BeyondPoints:
     """Of a ``volume`` found, where ``lost`` is what is gone."""
     points = scan(block() - lost) if points is None else points
     own = points[distance_to_mesh(points, as_part(block())) > TOLERANCE]
-    return ask_beyond_points(as_solid(block() ^ volume), as_part(block()), own, points, 0.0, GAP, TOLERANCE, "mm")
+    return ask_beyond_points(as_solid(block() ^ volume), make_field(points), own, "mm")
+
+
+def make_field(points: Floats) -> ScanField:
+    return ScanField.measure(as_part(block()), Scan(points, spacing=GAP), TOLERANCE)
 
 
 @pytest.mark.parametrize(
@@ -61,9 +66,9 @@ def test_more_than_skin_times_depth_is_contradicted() -> None:
 def test_added_metal_is_asked_as_well() -> None:
     points = scan(block() + pad(DEPTH))
     own = points[points[:, 2] > 4 + TOLERANCE]
-    rest = (points, 0.0, GAP, TOLERANCE, "mm")
-    assert not ask_beyond_points(as_solid(pad(DEPTH)), as_part(block()), own, *rest).reason
-    assert ask_beyond_points(as_solid(pad(4 * DEPTH)), as_part(block()), own, *rest).is_contradicted
+    field = make_field(points)
+    assert not ask_beyond_points(as_solid(pad(DEPTH)), field, own, "mm").reason
+    assert ask_beyond_points(as_solid(pad(4 * DEPTH)), field, own, "mm").is_contradicted
 
 
 def test_a_thin_wall_that_came_out_thick_is_told() -> None:
@@ -78,7 +83,5 @@ def test_a_thin_wall_that_came_out_thick_is_told() -> None:
 
 
 def test_without_points_of_its_own_nothing_is_said() -> None:
-    found = ask_beyond_points(
-        as_solid(pad(1.0)), as_part(block()), np.empty((0, 3)), scan(block()), 0.0, GAP, TOLERANCE, "mm"
-    )
+    found = ask_beyond_points(as_solid(pad(1.0)), make_field(scan(block())), np.empty((0, 3)), "mm")
     assert not found.reason
