@@ -9,9 +9,10 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.joints import end_at_reversals, round_corners
+from damageest_paths.joints import round_corners
 from damageest_paths.regions import (
     SAME,
+    close_ring,
     cover,
     find_main_angle,
     list_pieces,
@@ -22,7 +23,7 @@ from damageest_paths.regions import (
 )
 from damageest_paths.stripes import Bead, fill_with_rows
 from damageest_paths.trim import cut_ring, lengthen_line
-from damageest_paths.weave import Line, Pattern, Style, join_all, move_inside, weave_piece
+from damageest_paths.weave import Line, Pattern, Style, join_all, move_inside, part_lines, weave_piece
 
 STYLE = Style()
 SLIVER = 0.04
@@ -83,8 +84,7 @@ def list_lines(
 def _tidy(lines: Sequence[Line], region: Any, within: Any, bead: Bead) -> list[Line]:
     """The lines, joined, without reversals and those that hardly cover what no other does, their corners round."""
     width = bead.width
-    found = join_all(lines, within, bead)
-    found = [Line(piece, line.kind) for line in found for piece in end_at_reversals(line.points, width)]
+    found = part_lines(join_all(lines, within, bead), bead)
     covered = [cover([line.points], width) ^ region for line in found]
     for k in sorted(range(len(found)), key=lambda k: measure_length(found[k].points)):
         others = [one for n, one in enumerate(covered) if n != k and not one.is_empty()]
@@ -93,8 +93,7 @@ def _tidy(lines: Sequence[Line], region: Any, within: Any, bead: Bead) -> list[L
             covered[k] -= covered[k]
     found = [line for line, own in zip(found, covered, strict=True) if not own.is_empty()]
     round_ = [Line(round_corners(line.points, width), line.kind) for line in found]
-    parted = [Line(piece, line.kind) for line in round_ for piece in end_at_reversals(line.points, width)]
-    return [Line(thin_line(line.points, SAME * width), line.kind) for line in parted]
+    return [Line(thin_line(line.points, SAME * width), line.kind) for line in part_lines(round_, bead)]
 
 
 def _fill_beside(region: Any, lines: Sequence[Line], bead: Bead, free: Any, shortest: float, firm: Any) -> list[Line]:
@@ -170,7 +169,9 @@ def _read_rings(region: Any, bead: Bead, off: float = 0.01) -> list[Floats]:
     bead widths beside the outlines."""
     polygons = region.simplify(off * bead.width).to_polygons()
     rings = [np.asarray(ring, dtype=np.float64) for ring in polygons]
-    return [_refine(ring, bead.width) for ring in rings if len(ring) > 2 and measure_length(_close(ring)) > bead.width]
+    return [
+        _refine(ring, bead.width) for ring in rings if len(ring) > 2 and measure_length(close_ring(ring)) > bead.width
+    ]
 
 
 def _read_border(region: Any, within: float, bead: Bead) -> list[Floats]:
@@ -184,7 +185,3 @@ def _refine(ring: Floats, longest: float) -> Floats:
     counts = np.maximum(np.ceil(np.linalg.norm(sides, axis=1) / longest).astype(int), 1)
     share = np.concatenate([np.arange(count) / count for count in counts])
     return np.asarray(np.repeat(ring, counts, axis=0) + share[:, None] * np.repeat(sides, counts, axis=0))
-
-
-def _close(ring: Floats) -> Floats:
-    return np.concatenate([ring, ring[:1]])

@@ -96,6 +96,11 @@ def _outline(line: Floats, radius: float) -> list[Floats]:
     return list(np.concatenate([front, back], axis=1))
 
 
+def close_ring(ring: Floats) -> Floats:
+    """The corners (K,2) of a ring with the first one again at the end."""
+    return np.concatenate([ring, ring[:1]])
+
+
 def measure_length(line: Floats) -> float:
     """The length of a polyline (K,2) or (K,3)."""
     return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())

@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest_paths.joints import end_at_reversals, join_ends, open_ring
 from damageest_paths.regions import (
+    close_ring,
     cover,
     find_main_angle,
     is_within,
@@ -94,22 +95,24 @@ def weave_piece(region: Any, pattern: Pattern, bead: Bead, angle: float, style: 
         ]
         if pattern == "contour":
             rings, middles = _list_levels(inner, bead)
-            tries.append([*thin, *[Line(_close(_start_at(ring, ahead)), "ring") for ring in rings], *middles])
+            tries.append([*thin, *[Line(close_ring(_start_at(ring, ahead)), "ring") for ring in rings], *middles])
         if pattern == "spiral" or (pattern == "zigzag" and style.is_along):
             tries.append([*thin, *_draw_spiral(inner, bead, ahead)])
         if pattern in ("zigzag", "offset-zigzag"):
             rings = [_start_at(ring, ahead) for ring in read_rings(inner, bead)]
             within = shift_border(shift_border(inner, -NEARER * bead.step), width / 2)
             rows = [] if within.is_empty() else fill_with_rows(within, bead, angle, True, inner)
-            tries.append([*thin, *[Line(_close(ring), "ring") for ring in rings], *[Line(row, "row") for row in rows]])
+            tries.append(
+                [*thin, *[Line(close_ring(ring), "ring") for ring in rings], *[Line(row, "row") for row in rows]]
+            )
     link = shift_border(inner, INSIDE * width) if free is None else free
     if free is None and inner.is_empty():
         link = None
-    found = [_part(join_all(lines, link, bead), bead) for lines in tries]
+    found = [part_lines(join_all(lines, link, bead), bead) for lines in tries]
     return min(found, key=lambda lines: _estimate(lines, region, bead))
 
 
-def _part(lines: Sequence[Line], bead: Bead) -> list[Line]:
+def part_lines(lines: Sequence[Line], bead: Bead) -> list[Line]:
     """The lines, each ended where it would come back on itself."""
     return [Line(piece, line.kind) for line in lines for piece in end_at_reversals(line.points, bead.width)]
 
@@ -200,7 +203,7 @@ def _draw_spiral(inner: Any, bead: Bead, ahead: Floats) -> list[Line]:
                 line = open_ring(line, bead.step)
                 is_alone = False
             line = np.concatenate([line, open_ring(_roll(ring, line[-1], line[-1] - line[-2]), bead.step)])
-        lines.append(Line(_close(line) if is_alone else line, "ring" if is_alone else "spiral"))
+        lines.append(Line(close_ring(line) if is_alone else line, "ring" if is_alone else "spiral"))
     return [*lines, *middles]
 
 
@@ -221,12 +224,8 @@ def read_rings(region: Any, bead: Bead) -> list[Floats]:
     """The outlines of a region as rings (K,2), without the first corner again, with corners not farther apart than the
     bead's width."""
     rings = [np.asarray(ring, dtype=np.float64) for ring in region.to_polygons()]
-    rings = [ring for ring in rings if len(ring) > 2 and measure_length(_close(ring)) > bead.width / 2]
-    return [resample(_close(ring), bead.width / 2)[0][:-1] for ring in rings]
-
-
-def _close(ring: Floats) -> Floats:
-    return np.concatenate([ring, ring[:1]])
+    rings = [ring for ring in rings if len(ring) > 2 and measure_length(close_ring(ring)) > bead.width / 2]
+    return [resample(close_ring(ring), bead.width / 2)[0][:-1] for ring in rings]
 
 
 def _draw_thin(region: Any, bead: Bead, free: Any) -> list[Line]:
