@@ -52,6 +52,10 @@ WIDELY = 0.6
 """Share of the part's surface that a mirrored scan covers, from which the share that it may keep off the part does not
 count: lost metal is off the part either way."""
 
+PART, HUGE_GAIN = 0.4, 0.06
+"""The same where the mirrored scan lies on the part better by the second: whether skin is symmetric cannot be asked of
+what both explain, and what only one explains is so much."""
+
 LITTLE = 0.3
 """Share of the part's surface below which a scan that fits better mirrored is doubted and not refused: a few faces have
 a mirror image that fits another place of the part."""
@@ -132,7 +136,8 @@ def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random
     if not (of_mirrored.is_acceptable and _is_better(of_mirrored, check)):
         return result
     # of skin that the scan shows nearly whole, a pose that were as good unmirrored would have been found
-    is_whole = of_mirrored.cover > WHOLE and _is_far_better(of_mirrored, check)
+    gain = of_mirrored.agreement - check.agreement
+    is_whole = of_mirrored.cover > (PART if gain > HUGE_GAIN else WHOLE) and _is_far_better(of_mirrored, check)
     if not is_whole and _shows_symmetric(test, best, mirrored):
         return result
     if test.weigh(mirrored, best) < DECISIVE:

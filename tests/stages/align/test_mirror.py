@@ -65,6 +65,24 @@ def test_right_strips_are_not_refused(k: int) -> None:
     assert not is_refused(part, scan, 4 * scan.noise)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("view", [(1, 1, 1), (1, 1, -1)])
+def test_a_mirror_image_half_seen_is_refused(view: tuple[int, int, int]) -> None:
+    """What both hands explain of it is symmetric; what only one explains is not."""
+    boxes = [trimesh.creation.box(size) for size in ((60, 33, 8), (8, 33, 40), (30, 6, 14))]
+    for one, at in zip(boxes, ((0, 0, 0), (-26, 0, 16), (0, -13.5, 7)), strict=True):
+        one.apply_translation(at)
+    cut = trimesh.creation.box((20, 12, 12))
+    cut.apply_translation((-30, 16, 34))
+    bracket = trimesh.boolean.difference([trimesh.boolean.union(boxes, engine="manifold"), cut], engine="manifold")
+    part, rng = Part(bracket.vertices, bracket.faces), np.random.default_rng(0)
+    points, face = sample_by_area(part, 10_000, rng)
+    seen = points[part.face_normals[face] @ np.array(view) > 0]
+    scan = Scan(seen + rng.normal(scale=0.025, size=seen.shape), noise=0.025)
+    assert is_refused(part, mirror(scan), 0.1)
+    assert not is_refused(part, scan, 0.1)
+
+
 @pytest.mark.variants(slow=5)
 @pytest.mark.slow
 @pytest.mark.parametrize("seed", range(50, 53))
