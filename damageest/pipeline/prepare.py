@@ -116,7 +116,7 @@ def say_columns(scan: Scan) -> str:
     return f"; {'; '.join(scan.columns)}: if they are others, give scan.columns"
 
 
-@step(gives=("scan", "tolerance", "warnings"))
+@step(gives=("tolerance", "warnings"))
 def take_tolerance(
     scan: Scan,
     part: Part,
@@ -124,19 +124,21 @@ def take_tolerance(
     measured_spacing: float,
     depth_step: float,
     asked_tolerance: float | None,
-) -> tuple[Scan, float, Reasons]:
+) -> tuple[float, Reasons]:
     """Takes the tolerance of the job, or one for the scan as it was measured."""
     scan = replace(scan, noise=measured_noise, spacing=measured_spacing)
     tolerance, warnings = choose_tolerance(asked_tolerance, scan, part, depth_step)
     warnings = [*describe_few(scan), *warnings]
     if wrong_unit := diagnose_size(part.vertices, part.unit):
         warnings = [Reason("unit", wrong_unit), *warnings]
-    return scan, tolerance, warnings
+    return tolerance, warnings
 
 
 @step(gives=("scan", "warnings"))
-def set_filled_aside(scan: Scan) -> tuple[Scan, Reasons]:
-    """Removes points that software put where the scanner saw nothing, and says how many."""
+def set_filled_aside(scan: Scan, measured_noise: float, measured_spacing: float) -> tuple[Scan, Reasons]:
+    """The scan with what was measured of it, without points that software put where the scanner saw nothing; how many
+    these are."""
+    scan = replace(scan, noise=measured_noise, spacing=measured_spacing)
     filled = find_filled(scan.points, scan.noise)
     if not filled.any():
         return scan, ()

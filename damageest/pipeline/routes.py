@@ -71,8 +71,8 @@ ACQUIRE: Route = (
     correct_temperature,  # scan, temperature -> scan, thermal_scale, scan_centre
     measure_scan,  # scan, part, aligner -> measured_noise, measured_spacing, depth_step
     take_tolerance,  # scan, part, measured_noise, measured_spacing, depth_step, asked_tolerance
-    #     -> scan, tolerance, +warnings
-    set_filled_aside,  # scan -> scan, +warnings
+    #     -> tolerance, +warnings
+    set_filled_aside,  # scan, measured_noise, measured_spacing -> scan, +warnings
     where_taken(  # samples
         Sample,  # part, tolerance -> samples
         by=(Align, Segment, EncloseAll),
