@@ -73,6 +73,14 @@ def test_the_routes_say_what_flows(part: str) -> None:
     assert [(name, re.sub(r"\s+(# *)?", " ", flow).strip()) for name, flow in told] == wanted
 
 
+@pytest.mark.parametrize("name", ["part", "pose", "aligned", "tolerance", "registration", "deviation", "intact"])
+def test_a_reader_knows_which_value_of_a_name_is_meant(name: str) -> None:
+    """Few items of a route give it; corrections of where the scan lies give a registration."""
+    items = {item for method in METHODS for item in walk(routes.route_of(method)) if not isinstance(item, Branch)}
+    giving = {name_of(item) for item in items if name in (item.gives if isinstance(item, Step) else (item.gives,))}
+    assert len(giving) <= 3, giving
+
+
 def test_the_architecture_page_names_all_of_the_route_in_order() -> None:
     shown = (ROOT / "ARCHITECTURE.md").read_text().split("## The route")[1].split("```")[1]
     names = re.findall(r"\b\w+\b", re.sub(r"\[.*?\]| {3,}\S+\.py.*", "", shown))
