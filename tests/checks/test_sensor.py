@@ -11,6 +11,7 @@ from damageest.artefacts import Part, Scan
 from damageest.result import Result
 from damageest.stages.report._least_depth import map_least_depth
 from damageest.stages.report._values import list_sensor
+from damageest.stages.report._words import ENGLISH_WORDS
 from damageest.stages.scan.simulate import Simulate
 
 UNIT = PARTS["ribbed_plate"]().diagonal / 250
@@ -130,5 +131,5 @@ def test_where_the_scan_is_noisier_a_loss_has_to_be_deeper() -> None:
     right = result.aligned.points[chosen, 0] > 0
     assert np.median(depth[right]) > 2.5 * np.median(depth[~right])
     assert depth.min() >= 0.05
-    (page,) = list_sensor(result)[:1]
-    assert page[1].startswith("deeper than 0.4")
+    (page,) = list_sensor(result, ENGLISH_WORDS)[:1]
+    assert page[1].startswith("0.400 mm deep, ")

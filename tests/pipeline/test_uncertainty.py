@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 import damageest
 from damageest.artefacts import Deviation, Floats, Pose, Reason, Scan
 from damageest.cli import app
-from damageest.findings import Sensor
+from damageest.findings import Sensor, describe_interval
 from damageest.pipeline.state import JobState
 from damageest.pipeline.uncertainty import sum_uncertainty
 from damageest.result import Result
@@ -63,7 +63,7 @@ def test_an_undamaged_part_has_lost_nothing() -> None:
     low, high = run(3000, 0.06).volume_95 or (np.inf, np.inf)
     skin = np.linalg.norm(damaged_box.box().cross, axis=1).sum() / 2
     assert low == 0
-    assert 0 < high < 0.1 * 4 * 0.06 * skin, "far less than the tolerance all over"
+    assert 0 < high < 0.15 * 4 * 0.06 * skin, "far less than the tolerance all over"
 
 
 def worn_plate(amplitude: float, noise: float) -> tuple[Floats, float]:
@@ -118,7 +118,9 @@ def test_table_and_result_json_have_the_interval(small_done: Path) -> None:
     assert site["volume_95"] == pytest.approx([low, high])
     assert site["depth_95"][0] < 6 < site["depth_95"][1]
     assert site["uncertainty"]["noise"] > 0
-    assert f"{low:.4g} to {high:.4g}" in done.output
+    told = describe_interval((low, high))
+    assert told in done.output
+    assert [float(end) for end in told.split(" to ")] == pytest.approx([low, high], abs=0.05 * (high - low))
 
 
 def test_without_sites_nothing_is_lost_unless_the_pose_is_doubted() -> None:

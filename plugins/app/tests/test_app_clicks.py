@@ -206,7 +206,7 @@ def test_the_scan_is_cut_by_a_plane_that_is_drawn(shop: Path) -> None:
         page.click_view(0.3, 0.2)
         page.wait("cut-words", "other end")
         page.click_view(0.4, 0.9)
-        page.wait("cut-words", "is removed")
+        page.wait("cut-words", "are removed")
         page.shoot("cut")
         page.click("cut-flip")
         page.at_rest(0.5)
