@@ -45,12 +45,12 @@ SYMMETRIC, OFF = 0.005, 0.004
 """Share of the skin seen that a reflection may take off the part, by more than the second, for it to be symmetric: then
 a scan and its mirror image show the same."""
 
-WHOLE = 0.7
-"""Share of the part's surface that a mirrored scan covers, from which skin that is symmetric explains it no more."""
-
 WIDELY = 0.6
 """Share of the part's surface that a mirrored scan covers, from which the share that it may keep off the part does not
 count: lost metal is off the part either way."""
+
+WHOLE = 0.7
+"""Share of the part's surface that a mirrored scan covers, from which skin that is symmetric explains it no more."""
 
 PART, HUGE_GAIN = 0.4, 0.06
 """The same where the mirrored scan lies on the part better by the second: whether skin is symmetric cannot be asked of
