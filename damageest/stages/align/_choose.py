@@ -188,7 +188,7 @@ def _is_continuous(
 
 def _keep_near(field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
     """The points (N,3) that a pose puts near the surface; exact distances of the others are slow and not needed."""
-    return points[np.abs(field.distance[field.find_cell(move_points(points, pose).astype(np.float32))]) < FAR]
+    return points[np.abs(field.estimate_distance(move_points(points, pose))) < FAR]
 
 
 def _measure_distance(target: PartSurface, field: PlaneGrid, points: Floats, pose: Floats) -> Floats:
@@ -200,7 +200,7 @@ def _measure_distances(target: PartSurface, field: PlaneGrid, points: Floats, po
     """Signed distances (H,N) of the points (N,3) in each of the poses (H,4,4): exact near the surface, from the grid
     far from it."""
     at = np.concatenate([move_points(points, pose) for pose in poses])
-    distance = field.distance[field.find_cell(at.astype(np.float32))].astype(np.float64)
+    distance = field.estimate_distance(at).astype(np.float64)
     near = np.abs(distance) < FAR
     distance[near] = target.closest(at[near])[0]
     return distance.reshape(len(poses), len(points))

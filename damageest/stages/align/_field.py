@@ -105,6 +105,10 @@ class PlaneGrid:
         size = (int(shape[0]), int(shape[1]), int(shape[2]))
         return cls(low.astype(np.float32), cell, size, plane, distance.astype(np.float32))
 
+    def estimate_distance(self, points: Floats) -> Floats32:
+        """(N,) signed distance of the cells that points (N,3) lie in."""
+        return self.distance[self.find_cell(points.astype(np.float32))]
+
     def find_cell(self, points: Floats32) -> Ints:
         """The cell (...) of each of points (...,3); points beyond the grid get the outermost cell, far off the part."""
         at = (points - self.low) * np.float32(1 / self.cell)

@@ -172,10 +172,7 @@ def _fit_reflections(test: MirrorTest, best: Fit) -> list[Fit]:
     tried: list[Floats] = []
     for middle in (np.zeros(3), np.median(few, axis=0)):
         mirrors = make_reflections(middle)
-        on = [
-            float((np.abs(grid.distance[grid.find_cell(move_points(few, one).astype(np.float32))]) < COARSE).mean())
-            for one in mirrors
-        ]
+        on = [float((np.abs(grid.estimate_distance(move_points(few, one))) < COARSE).mean()) for one in mirrors]
         tried.extend(mirrors[np.argsort(-np.array(on), kind="stable")[:FITTED]])
     moved = [move_points(at, mirror) for mirror in tried]
     fits = fit_each(target, moved, [np.eye(4)] * len(tried), 3 * COARSE, test.noise, 30)

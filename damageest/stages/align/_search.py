@@ -15,6 +15,8 @@ from damageest.stages.align._points import OrientedPoints, draw_by_direction
 
 CHUNK = 200_000
 """Number of points that a thread looks up at once, to limit memory."""
+KEPT = (12_000, 2000)
+"""Poses that are left after the first and after the second look, each at more points."""
 
 
 def score(poses: Floats, scan: OrientedPoints, field: PlaneGrid, band: float) -> Floats:
@@ -95,10 +97,6 @@ def _look_up(
     cosine = np.einsum("hmk,hmk->hm", facing, plane[..., :3])
     agree = np.clip((cosine if scan.signed else np.abs(cosine)) * 2 - 0.8, 0, 1)
     return moved, offset, np.abs(distance) < band + field.cell, agree, index if planes else distance
-
-
-KEPT = (12_000, 2000)
-"""Poses that are left after the first and after the second look, each at more points."""
 
 
 def search(

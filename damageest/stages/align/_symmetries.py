@@ -79,14 +79,11 @@ def is_mirrored_onto_itself(target: PartSurface, grid: PlaneGrid, seed: int) -> 
     rng = np.random.default_rng([seed, 3])
     surface = orient_surface(target.known, 4000, rng).points
     mirrors = make_reflections(surface.mean(axis=0))
-    on = [
-        float(np.abs(grid.distance[grid.find_cell(move_points(surface[:1000], one).astype(np.float32))]).mean())
-        for one in mirrors
-    ]
+    off = [float(np.abs(grid.estimate_distance(move_points(surface[:1000], one))).mean()) for one in mirrors]
     corners, middles = target.mesh.vertices, target.mesh.vertices[target.mesh.faces].mean(axis=1)
     checked = [surface, *(some[rng.permutation(len(some))[:MOST_CORNERS]] for some in (corners, middles))]
-    for index in np.argsort(on, kind="stable")[:MIRRORS]:
-        if on[index] > NEAR:
+    for index in np.argsort(off, kind="stable")[:MIRRORS]:
+        if off[index] > NEAR:
             break
         mirror = mirrors[index]
         moved = move_points(surface[:600], mirror)

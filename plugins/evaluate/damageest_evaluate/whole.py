@@ -33,6 +33,8 @@ COMMON = ("block", "gear", "half_torus", "blade", "tube", "shaft", "keyed_shaft"
 LARGE = "two large losses"
 """The large run: a million points at a tolerance of five noises, known pose."""
 WHOLE = (*COMMON, LARGE)
+OWN = str(Path(sys.executable).with_name("damageest"))
+"""The program of this environment."""
 
 
 @dataclass(frozen=True)
@@ -150,7 +152,3 @@ def make_whole_table(runs: Sequence[Run]) -> str:
             last += [f"{median(least[program]):.1f}", "", "", ""]
         rows.append(last)
     return format_markdown(rows)
-
-
-OWN = str(Path(sys.executable).with_name("damageest"))
-"""The program of this environment."""
