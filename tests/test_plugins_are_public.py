@@ -76,9 +76,9 @@ def is_public(module: str, name: str) -> bool:
 
 
 def is_implementation(parts: list[str], name: str) -> bool:
-    """Whether the name is a module of one stage, as in `from damageest.stages.enclose import adaptive`."""
+    """Whether the name is a module or a room of one stage, as in `from damageest.stages.enclose import adaptive`."""
     folder = Path(*parts)
-    return len(parts) == 3 and (PLUGINS.parent / folder / f"{name}.py").exists()
+    return len(parts) == 3 and any((PLUGINS.parent / folder / one).exists() for one in (f"{name}.py", name))
 
 
 def list_private_attributes(source: str) -> list[str]:
@@ -142,6 +142,8 @@ def test_a_plugin_uses_public_names_only() -> None:
         "from damageest.stages.enclose._sew import build_strip",
         "from damageest.stages.enclose.adaptive import Adaptive",
         "from damageest.stages.enclose import adaptive",
+        "from damageest.stages.align import symmetry",
+        "from damageest.stages.align.symmetry.choose import choose_pose",
         "import damageest.stages.enclose.adaptive",
         "from damageest.pipeline.engine import Engine",
         "from damageest.job.check import load",

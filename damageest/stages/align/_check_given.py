@@ -8,14 +8,14 @@ from scipy.spatial.transform import Rotation
 from damageest.artefacts import Effect, Floats, Part, Reason, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
-from damageest.stages.align._check_pose import check_pose
-from damageest.stages.align._check_worn import check_with_wear, measure_given_wear
-from damageest.stages.align._fine import Fit, fit
-from damageest.stages.align._frame import Frame
-from damageest.stages.align._mirror import MIN_GAIN as LEAST_OFF
-from damageest.stages.align._mirror import MirrorTest, ask_handedness
-from damageest.stages.align._points import draw_evenly, orient_scan, orient_surface
-from damageest.stages.align._prepare_part import prepare_part
+from damageest.stages.align.handedness.mirror import MIN_GAIN as LEAST_OFF
+from damageest.stages.align.handedness.mirror import MirrorTest, ask_handedness
+from damageest.stages.align.refine.check_pose import check_pose
+from damageest.stages.align.refine.fit import Fit, fit
+from damageest.stages.align.surface.frame import Frame
+from damageest.stages.align.surface.points import draw_evenly, orient_scan, orient_surface
+from damageest.stages.align.symmetry.prepare_part import prepare_part
+from damageest.stages.align.wear.check_worn import check_with_wear, measure_given_wear
 
 REACH = 0.04
 """How far off a given pose may be for the pose nearby to be found, in diagonals of the part."""

@@ -6,16 +6,16 @@ import numpy as np
 
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
-from damageest.stages.align._ambiguity import find_loose_motions
-from damageest.stages.align._by_system import finish_by_datum
-from damageest.stages.align._check_worn import check_with_wear
-from damageest.stages.align._datum import Datum
-from damageest.stages.align._fine import fit
-from damageest.stages.align._finish import Finish
-from damageest.stages.align._frame import Frame
-from damageest.stages.align._largest_piece import prefer_largest_piece
-from damageest.stages.align._points import draw_evenly, orient_scan
-from damageest.stages.align._system import find_datum
+from damageest.stages.align.datum.by_system import finish_by_datum
+from damageest.stages.align.datum.option import Datum
+from damageest.stages.align.datum.system import find_datum
+from damageest.stages.align.refine.fit import fit
+from damageest.stages.align.refine.largest_piece import prefer_largest_piece
+from damageest.stages.align.surface.frame import Frame
+from damageest.stages.align.surface.points import draw_evenly, orient_scan
+from damageest.stages.align.symmetry.ambiguity import find_loose_motions
+from damageest.stages.align.wear.check_worn import check_with_wear
+from damageest.stages.align.wear.finish import Finish
 
 
 def fit_from_start(

@@ -14,7 +14,7 @@ from damageest.geometry.distance import signed_distance
 from damageest.geometry.selectors import Selector, StrictMapping
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align import Align
-from damageest.stages.align._frame import Frame, RigidPose
+from damageest.stages.align.surface.frame import Frame, RigidPose
 
 Axis = Literal["x", "y", "z"]
 Vector = tuple[FiniteFloat, FiniteFloat, FiniteFloat]

@@ -9,8 +9,8 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Part, Pose, Scan
 from damageest.stages.align import Align
-from damageest.stages.align._datum import NO_DATUM, Datum
-from damageest.stages.align._frame import RigidPose
+from damageest.stages.align.datum.option import NO_DATUM, Datum
+from damageest.stages.align.surface.frame import RigidPose
 
 
 class Icp(Align):

@@ -11,7 +11,7 @@ from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align import Align
-from damageest.stages.align._frame import RigidPose
+from damageest.stages.align.surface.frame import RigidPose
 
 
 class KnownPose(Align):
@@ -36,8 +36,8 @@ class KnownPose(Align):
         """The given pose; its inliers are the scan points within the tolerance of the part, of about 100,000 at
         most. Raises StageError where the scan contradicts it."""
         from damageest.stages.align._check_given import check_given
-        from damageest.stages.align._field import PartSurface
-        from damageest.stages.align._frame import MIN_POINTS
+        from damageest.stages.align.surface.frame import MIN_POINTS
+        from damageest.stages.align.surface.planes import PartSurface
 
         T = self.known_pose
         if not len(scan.points):

@@ -12,7 +12,7 @@ from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import find_nearest_motion, move_points
 from damageest.stages.align import Align
-from damageest.stages.align._datum import NO_DATUM, Datum
+from damageest.stages.align.datum.option import NO_DATUM, Datum
 
 Point = tuple[float, float, float]
 

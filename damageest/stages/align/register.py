@@ -10,7 +10,7 @@ from pydantic import Field as Option
 
 from damageest.artefacts import Part, Pose, Reason, Scan
 from damageest.stages.align import Align
-from damageest.stages.align._datum import NO_DATUM, Datum
+from damageest.stages.align.datum.option import NO_DATUM, Datum
 
 
 class Register(Align):
@@ -46,19 +46,19 @@ class Register(Align):
         """The fitted pose. Raises StageError where no pose explains the scan: it shows another part, has another unit,
         or most of it is not the part."""
         from damageest.errors import StageError
-        from damageest.stages.align._ambiguity import describe_choice, find_loose_motions, note_ambiguity
-        from damageest.stages.align._choose import COARSE, Choice, choose_pose
-        from damageest.stages.align._fine import fit
-        from damageest.stages.align._frame import MIN_POINTS, Frame
-        from damageest.stages.align._last_fit import FIRST, LastFit
-        from damageest.stages.align._mirror import MIN_GAIN, MirrorTest, ask_handedness
-        from damageest.stages.align._normals import SignedNormals, note_inward, prefer_outward
-        from damageest.stages.align._pairs import propose_poses
-        from damageest.stages.align._points import draw_evenly, draw_stratified, orient_scan
-        from damageest.stages.align._prepare_part import prepare_part
-        from damageest.stages.align._scale import ask_scale
-        from damageest.stages.align._search import search
-        from damageest.stages.align._system import find_datum
+        from damageest.stages.align.datum.last_fit import FIRST, LastFit
+        from damageest.stages.align.datum.system import find_datum
+        from damageest.stages.align.handedness.mirror import MIN_GAIN, MirrorTest, ask_handedness
+        from damageest.stages.align.handedness.normals import SignedNormals, note_inward, prefer_outward
+        from damageest.stages.align.handedness.scale import ask_scale
+        from damageest.stages.align.refine.fit import fit
+        from damageest.stages.align.search.pairs import propose_poses
+        from damageest.stages.align.search.search import search
+        from damageest.stages.align.surface.frame import MIN_POINTS, Frame
+        from damageest.stages.align.surface.points import draw_evenly, draw_stratified, orient_scan
+        from damageest.stages.align.symmetry.ambiguity import describe_choice, find_loose_motions, note_ambiguity
+        from damageest.stages.align.symmetry.choose import COARSE, Choice, choose_pose
+        from damageest.stages.align.symmetry.prepare_part import prepare_part
 
         datum = find_datum(part, self.datum)
         frame = Frame.build(scan, part)

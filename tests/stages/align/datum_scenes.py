@@ -13,7 +13,7 @@ from damageest.artefacts import Floats, Ints, Part, Pose, Scan
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.shapes import recognise_shape
 from damageest.geometry.solids import to_arrays
-from damageest.stages.align._system import DatumSystem, split_faces
+from damageest.stages.align.datum.system import DatumSystem, split_faces
 from damageest.stages.align.icp import Icp
 
 NOISE = 2e-4

@@ -8,8 +8,8 @@ import trimesh
 
 from damageest.artefacts import Mesh
 from damageest.geometry.distance import signed_distance
-from damageest.stages.align._field import NEAR, PartSurface
-from damageest.stages.align._prepare_part import prepare_part
+from damageest.stages.align.surface.planes import NEAR, PartSurface
+from damageest.stages.align.symmetry.prepare_part import prepare_part
 
 
 @pytest.mark.variants(1)

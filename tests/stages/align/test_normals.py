@@ -10,9 +10,9 @@ from align_scenes import error, scene
 
 import damageest
 from damageest.artefacts import Floats, Part, Scan
-from damageest.stages.align._field import PartSurface
-from damageest.stages.align._normals import SignedNormals
+from damageest.stages.align.handedness.normals import SignedNormals
 from damageest.stages.align.register import Register
+from damageest.stages.align.surface.planes import PartSurface
 
 
 def make_signs(kind: str, count: int) -> Floats:

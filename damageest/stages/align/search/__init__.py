@@ -1,0 +1,1 @@
+"""Which poses are possible: pairs of points, scores of thousands of poses, and which of two the scan favours."""
