@@ -63,7 +63,6 @@ CROWDED = {
     "damageest/rules": 28,
     "damageest/stages/report": 23,
     "plugins/app/damageest_app": 21,
-    "plugins/cadquery/damageest_cadquery": 60,
     "plugins/evaluate/damageest_evaluate": 25,
     "plugins/paths/damageest_paths": 51,
 }

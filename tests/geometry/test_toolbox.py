@@ -65,6 +65,6 @@ def test_nothing_from_above_is_imported() -> None:
 
 def test_libigl_is_imported_by_few_modules() -> None:
     users = {path for path in SOURCES if any(name.split(".")[0] == "igl" for name in list_imported(path))}
-    thinning = ROOT / "plugins/cadquery/damageest_cadquery/_polyhedron.py"  # asks libigl for fewer triangles
+    thinning = ROOT / "plugins/cadquery/damageest_cadquery/surfaces/polyhedron.py"  # asks libigl for fewer triangles
     own = {FOLDER / f"{name}.py" for name in ("distance", "isosurface", "long_faces", "pseudonormals", "rays")}
     assert users == {*own, thinning}

@@ -28,8 +28,8 @@ def damageest_stages() -> list[type[Stage]]:
 def damageest_writers() -> Mapping[str, Writer]:
     """STEP, of solids and splines."""
     from damageest.stages.export import Writer
-    from damageest_cadquery._patch import write_patch
-    from damageest_cadquery._step import write_step
+    from damageest_cadquery.writing.patch import write_patch
+    from damageest_cadquery.writing.step import write_step
 
     return {"step": Writer(write_step, simplify=True, patch=write_patch, exact=_write_exact)}
 

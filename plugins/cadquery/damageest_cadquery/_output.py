@@ -10,20 +10,20 @@ from pathlib import Path
 from damageest.artefacts import Floats
 from damageest.isolation import at_work
 from damageest.stages.export import Body, DepositForm, ExactForm
-from damageest_cadquery._assembly import Colour, NamedShape
-from damageest_cadquery._deposit import STOCK
-from damageest_cadquery._doubles import SHARED
-from damageest_cadquery._exact import scale_shape
-from damageest_cadquery._files import join_shapes, write_shapes
 from damageest_cadquery._kept import keep_made
-from damageest_cadquery._left import FACET, cut_facets
-from damageest_cadquery._opened import FOUND
-from damageest_cadquery._planar import build_solid
-from damageest_cadquery._read import explore
 from damageest_cadquery._request import SPENT, CadFacts, Made, Request, name_file
 from damageest_cadquery._sites import Solved, describe_exact
-from damageest_cadquery._solids import StockError
-from damageest_cadquery._split import Piece
+from damageest_cadquery.cutting.exact_damage import scale_shape
+from damageest_cadquery.cutting.left import FACET, cut_facets
+from damageest_cadquery.reading.read import explore
+from damageest_cadquery.solids.doubles import SHARED
+from damageest_cadquery.solids.joining import StockError
+from damageest_cadquery.solids.planar import build_solid
+from damageest_cadquery.solids.split import Piece
+from damageest_cadquery.stock.deposit import STOCK
+from damageest_cadquery.stock.opened import FOUND
+from damageest_cadquery.writing.assembly import Colour, NamedShape
+from damageest_cadquery.writing.write_shapes import join_shapes, write_shapes
 
 INNER: Colour = (215, 50, 40)
 PREPARED: Colour = (235, 150, 60)
@@ -209,7 +209,7 @@ def _collect(
 ) -> list[NamedShape]:
     """What the assembly holds: what is left of the part, damage volumes and deposits, with facets where they have no
     exact form."""
-    from damageest_cadquery._step import MAX_FACES
+    from damageest_cadquery.writing.step import MAX_FACES
 
     found = []
     for stem, body in bodies.items():

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 from damageest.artefacts import Deposit, DisplacementField, Floats, Part
 from damageest.stages.export import Body, DepositForm, ExactForm, MilledForm
-from damageest_cadquery._assembly import Colour
-from damageest_cadquery._exact import SiteInput
+from damageest_cadquery.cutting.exact_damage import SiteInput
+from damageest_cadquery.writing.assembly import Colour
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,6 @@ from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.skin import find_inner_faces
 from damageest.isolation import at_work
 from damageest.stages.export import DepositForm, ExactForm, MilledForm
-from damageest_cadquery._crossed import find_crossed
-from damageest_cadquery._deposit import STOCK, ExactDeposit, find_deposit, refuse_doubles
-from damageest_cadquery._exact import Exact, SiteInput, find_exact
-from damageest_cadquery._opened import ExactMilled, find_milled, take_opened
 from damageest_cadquery._request import (
     SPENT,
     CadFacts,
@@ -32,8 +28,12 @@ from damageest_cadquery._request import (
     name_opened,
     name_site,
 )
-from damageest_cadquery._solids import StockError, list_faces
-from damageest_cadquery._split import Piece
+from damageest_cadquery.cutting.crossed import find_crossed
+from damageest_cadquery.cutting.exact_damage import Exact, SiteInput, find_exact
+from damageest_cadquery.solids.joining import StockError, list_faces
+from damageest_cadquery.solids.split import Piece
+from damageest_cadquery.stock.deposit import STOCK, ExactDeposit, find_deposit, refuse_doubles
+from damageest_cadquery.stock.opened import ExactMilled, find_milled, take_opened
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,17 +6,17 @@ from pathlib import Path
 from typing import Any
 
 from damageest.isolation import at_work
-from damageest_cadquery._adapted import MovedSolids, move_solids
-from damageest_cadquery._claims import lower_claims
-from damageest_cadquery._colours import read_colours
-from damageest_cadquery._exact import scale_shape, start_solids
-from damageest_cadquery._files import join_shapes
 from damageest_cadquery._kept import find_made, find_solved, keep_solved
-from damageest_cadquery._moved import MoveError
 from damageest_cadquery._output import Writing, write_all
-from damageest_cadquery._read import Model, explore, read
 from damageest_cadquery._request import ADAPTING, WHOLE, CadFacts, Made, Request, describe_none
 from damageest_cadquery._sites import SiteWork
+from damageest_cadquery.cutting.exact_damage import scale_shape, start_solids
+from damageest_cadquery.moving.adapted import MovedSolids, move_solids
+from damageest_cadquery.moving.moved import MoveError
+from damageest_cadquery.reading.claims import lower_claims
+from damageest_cadquery.reading.colours import read_colours
+from damageest_cadquery.reading.read import Model, explore, read
+from damageest_cadquery.writing.write_shapes import join_shapes
 
 CLAIMS = 0.01
 """Largest tolerance of an edge, in tolerances of the job, that is taken as the CAD file claims it."""

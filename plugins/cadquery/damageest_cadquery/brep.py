@@ -18,7 +18,7 @@ from damageest.stages import JobPath
 from damageest.stages.part import CadFace, CadPmi, ReadPart
 
 if TYPE_CHECKING:
-    from damageest_cadquery._read import Model
+    from damageest_cadquery.reading.read import Model
 
 LEAST_CHORD = 1e-7
 """Least chord in diagonals of the part: OpenCASCADE's own tolerance for a part of one metre is 1e-7."""
@@ -53,7 +53,7 @@ class Brep(ReadPart):
     def run(self, unit: str, tolerance: float | None) -> Part:
         """The part in ``unit``. Raises InputError for a file that OpenCASCADE cannot read or that holds no solid."""
         suffix = check_file(self.path, self.reads, "a part")
-        from damageest_cadquery._tessellate import measure_diagonal, tessellate
+        from damageest_cadquery.reading.tessellate import measure_diagonal, tessellate
 
         with _name_faults(self.path, suffix):
             model = self._read(suffix, unit)
@@ -97,7 +97,7 @@ class Brep(ReadPart):
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
         """The faces of the CAD model, in the order in which `run` numbers them."""
         suffix = check_file(self.path, self.reads, "a part")
-        from damageest_cadquery._faces import list_faces
+        from damageest_cadquery.reading.list_faces import list_faces
 
         with _name_faults(self.path, suffix):
             model = self._read(suffix, unit)
@@ -106,7 +106,7 @@ class Brep(ReadPart):
 
     def _read(self, suffix: str, unit: str) -> Model:
         """The CAD model; ``unit``: the job's."""
-        from damageest_cadquery._read import read
+        from damageest_cadquery.reading.read import read
 
         file_unit = (self.unit or unit) if suffix == ".brep" else "mm"
         return read(self.path, suffix, None if self.gap is None else self.gap * unit_factor(unit, file_unit))
@@ -116,9 +116,9 @@ class Brep(ReadPart):
         suffix = check_file(self.path, self.reads, "a part")
         if suffix not in (".step", ".stp"):
             return super().cad_pmi(unit)
-        from damageest_cadquery._faces import number_entities
-        from damageest_cadquery._pmi import find_pmi
-        from damageest_cadquery._read import read
+        from damageest_cadquery.reading.list_faces import number_entities
+        from damageest_cadquery.reading.pmi import find_pmi
+        from damageest_cadquery.reading.read import read
 
         with _name_faults(self.path, suffix):
             model = read(self.path, suffix)

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from damageest.geometry.edges import list_edges
-from damageest_cadquery._read import Model, read
-from damageest_cadquery._tessellate import measure_diagonal, tessellate
+from damageest_cadquery.reading.read import Model, read
+from damageest_cadquery.reading.tessellate import measure_diagonal, tessellate
 
 INNER = 0.98
 """Hue of the first face inside the part; those of the CAD get the colours between blue and green."""

@@ -18,9 +18,7 @@ from damageest.io.files import shorten_error
 from damageest.isolation import Limits, ProcessError, Usage, call_isolated, find_place, tell_part
 from damageest.result import Result
 from damageest.stages.export import Body, ExportedFiles
-from damageest_cadquery._exact import SiteInput, scale_shape
 from damageest_cadquery._kept import find_made
-from damageest_cadquery._read import read
 from damageest_cadquery._request import (
     ADAPTING,
     SPENT,
@@ -31,9 +29,11 @@ from damageest_cadquery._request import (
     limit_form,
     name_site,
 )
-from damageest_cadquery._split import measure_volume as measure_volume  # for the evaluation
-from damageest_cadquery._step import OWNER
 from damageest_cadquery._worker import make_exact, write_part
+from damageest_cadquery.cutting.exact_damage import SiteInput, scale_shape
+from damageest_cadquery.reading.read import read
+from damageest_cadquery.solids.split import measure_volume as measure_volume  # for the evaluation
+from damageest_cadquery.writing.step import OWNER
 
 Given = TypeVar("Given")
 NO_FIELD = "the part was adapted to the scan by a stage without a displacement field, so its CAD faces cannot follow"

@@ -6,8 +6,9 @@ import os
 from collections.abc import Callable
 from typing import Any
 
-from damageest_cadquery import _exact, _sites, _worker
+from damageest_cadquery import _sites, _worker
 from damageest_cadquery._request import Made, Request
+from damageest_cadquery.cutting import exact_damage as _exact
 
 Find = Callable[..., Any]
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import trimesh
 from damageest_cadquery import exact
-from damageest_cadquery._split import measure_volume, triangulate
+from damageest_cadquery.solids.split import measure_volume, triangulate
 
 import damageest
 from damageest.artefacts import Floats, Mesh, Solid
@@ -107,8 +107,8 @@ def test_the_part_itself_is_the_adapted_one(done: Run) -> None:
 
 
 def test_faces_keep_their_names(done: Run) -> None:
-    from damageest_cadquery._faces import list_faces
-    from damageest_cadquery._read import read
+    from damageest_cadquery.reading.list_faces import list_faces
+    from damageest_cadquery.reading.read import read
 
     names = {face.name for face in list_faces(read(done.folder / "undamaged.step", ".step"), 1.0)}
     assert {f"face {k}" for k in range(7)} <= names

@@ -20,7 +20,7 @@ TOLERANCE = 0.2
 
 
 def mesh_part(shape: Any, chord: float) -> Part:
-    from damageest_cadquery._tessellate import tessellate
+    from damageest_cadquery.reading.tessellate import tessellate
 
     from damageest.geometry.make_part import make_part
 
@@ -43,8 +43,8 @@ def cut_off(part: Mesh, x: float) -> Solid:
 
 def cut_exactly(shape: Any, x: float) -> Any:
     """What of a solid lies beyond a plane x = const, as pieces of which that plane's face is inside the part."""
-    from damageest_cadquery._solids import explore_faces
-    from damageest_cadquery._split import Piece
+    from damageest_cadquery.solids.joining import explore_faces
+    from damageest_cadquery.solids.split import Piece
 
     box = cq.Workplane().box(100, 100, 100).translate((50 + x, 0, 0))
     solid = shape.intersect(box).val().Solids()[0].wrapped
@@ -53,8 +53,8 @@ def cut_exactly(shape: Any, x: float) -> Any:
 
 
 def test_the_step_is_the_distance_between_the_cuts() -> None:
-    from damageest_cadquery._balance import Balance
-    from damageest_cadquery._exact import start_solids
+    from damageest_cadquery.cutting._balance import Balance
+    from damageest_cadquery.cutting.exact_damage import start_solids
 
     block = cq.Workplane().box(30, 20, 12)
     part = mesh_part(block, 0.1)
@@ -68,10 +68,10 @@ def test_the_step_is_the_distance_between_the_cuts() -> None:
 
 
 def test_chords_are_not_taken_for_a_cut_that_is_off() -> None:
-    from damageest_cadquery._balance import Balance
-    from damageest_cadquery._check import measure_inner_area
-    from damageest_cadquery._exact import start_solids
-    from damageest_cadquery._split import measure_volume
+    from damageest_cadquery.cutting._balance import Balance
+    from damageest_cadquery.cutting.check_pieces import measure_inner_area
+    from damageest_cadquery.cutting.exact_damage import start_solids
+    from damageest_cadquery.solids.split import measure_volume
 
     for shape, sign in (
         (cq.Workplane().cylinder(20, 10), 1),
@@ -92,9 +92,9 @@ def test_chords_are_not_taken_for_a_cut_that_is_off() -> None:
 
 
 def test_a_cut_is_moved_to_the_volume_of_the_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    from damageest_cadquery import _exact
-    from damageest_cadquery._attempts import Attempt
-    from damageest_cadquery._split import Tool, measure_volume
+    from damageest_cadquery.cutting import exact_damage as _exact
+    from damageest_cadquery.cutting._attempts import Attempt
+    from damageest_cadquery.solids.split import Tool, measure_volume
 
     block = cq.Workplane().box(30, 20, 12)
     part = mesh_part(block, 0.1)
@@ -122,9 +122,9 @@ def test_a_cut_is_moved_to_the_volume_of_the_mesh(monkeypatch: pytest.MonkeyPatc
 @pytest.mark.slow
 def test_of_forms_that_pass_the_one_with_the_nearest_volume_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
     """On a curved part the check of the volume has room for chords; where these are small, it is too much."""
-    from damageest_cadquery import _exact
-    from damageest_cadquery._attempts import Attempt
-    from damageest_cadquery._split import Tool
+    from damageest_cadquery.cutting import exact_damage as _exact
+    from damageest_cadquery.cutting._attempts import Attempt
+    from damageest_cadquery.solids.split import Tool
 
     shaft = cq.Workplane().cylinder(20, 10)
     part = replace(mesh_part(shaft, 0.002), tessellation_error=0.1)
@@ -163,7 +163,7 @@ def make_folded(height: float) -> Mesh:
 
 
 def test_a_surface_that_crosses_itself_is_untangled() -> None:
-    from damageest_cadquery._untangle import keep_apart, untangle
+    from damageest_cadquery.surfaces._untangle import keep_apart, untangle
 
     folded = make_folded(0.3)
     edges, crossed = find_crossings(folded)
@@ -179,7 +179,7 @@ def test_a_surface_that_crosses_itself_is_untangled() -> None:
 
 
 def test_a_crossing_of_large_triangles_moves_a_small_part_of_the_surface() -> None:
-    from damageest_cadquery._untangle import refine_crossings, untangle
+    from damageest_cadquery.surfaces._untangle import refine_crossings, untangle
 
     from damageest.geometry.distance import distance_to_mesh
 

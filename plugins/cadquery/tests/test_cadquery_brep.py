@@ -121,7 +121,7 @@ def test_surfaces_that_close_are_sewn_and_it_is_said(tmp_path: Path) -> None:
 
 
 def test_a_solid_without_faces_is_none(tmp_path: Path) -> None:
-    from damageest_cadquery._read import read
+    from damageest_cadquery.reading.read import read
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound, TopoDS_Solid
 

@@ -15,7 +15,7 @@ cq = import_for("cadquery", "cadquery")
 
 def make_claiming(claim: float) -> Any:
     """A cylinder whose edges claim a tolerance that they do not need."""
-    from damageest_cadquery._read import explore
+    from damageest_cadquery.reading.read import explore
     from OCP.BRep import BRep_Builder
     from OCP.TopAbs import TopAbs_EDGE
     from OCP.TopoDS import TopoDS
@@ -28,7 +28,7 @@ def make_claiming(claim: float) -> Any:
 
 def split_at(solid: Any, z: float) -> list[float]:
     """The volumes of what a plane divides a solid into."""
-    from damageest_cadquery._split import Tool, measure_volume, split
+    from damageest_cadquery.solids.split import Tool, measure_volume, split
 
     plane = cq.Face.makePlane(40, 40, (0, 0, z), (0, 0, 1)).wrapped
     pieces = split(solid, 0, [(k, -1) for k in range(3)], Tool([plane], plane), 1e-6)
@@ -36,7 +36,7 @@ def split_at(solid: Any, z: float) -> list[float]:
 
 
 def test_a_claim_that_is_not_needed_is_lowered() -> None:
-    from damageest_cadquery._claims import lower_claims
+    from damageest_cadquery.reading.claims import lower_claims
 
     true = [np.pi * 100 * 0.5, np.pi * 100 * 19.5]
     wrong = make_claiming(1.5)
@@ -47,7 +47,7 @@ def test_a_claim_that_is_not_needed_is_lowered() -> None:
 
 
 def test_other_claims_stay() -> None:
-    from damageest_cadquery._claims import lower_claims
+    from damageest_cadquery.reading.claims import lower_claims
     from OCP.BRepCheck import BRepCheck_Analyzer
 
     small = make_claiming(0.001)
@@ -59,7 +59,7 @@ def test_other_claims_stay() -> None:
 
 def make_gap(off: float, claim: float | None = None) -> Any:
     """A cylinder whose upper edge lies off its faces, and says so unless it claims less."""
-    from damageest_cadquery._read import explore
+    from damageest_cadquery.reading.read import explore
     from OCP.BRep import BRep_Builder
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.Geom import Geom_Circle
@@ -80,9 +80,9 @@ def make_gap(off: float, claim: float | None = None) -> Any:
 
 
 def test_a_corner_on_an_edge_of_the_part_is_not_off_the_part() -> None:
-    from damageest_cadquery._check import _measure_off
-    from damageest_cadquery._solids import explore_faces
-    from damageest_cadquery._split import Tool, find_corners, split
+    from damageest_cadquery.cutting.check_pieces import _measure_off
+    from damageest_cadquery.solids.joining import explore_faces
+    from damageest_cadquery.solids.split import Tool, find_corners, split
 
     solid = make_gap(0.05)
     faces, plane = explore_faces(solid), cq.Face.makePlane(40, 40, (3, 0, 0), (1, 0, 0)).wrapped
@@ -103,9 +103,9 @@ def test_a_corner_on_an_edge_of_the_part_is_not_off_the_part() -> None:
 
 def test_a_piece_that_is_not_valid_is_refused_before_it_is_triangulated(monkeypatch: pytest.MonkeyPatch) -> None:
     """The triangles of such a piece can take minutes."""
-    from damageest_cadquery import _pieces
-    from damageest_cadquery._exact import start_solids
-    from damageest_cadquery._split import Tool, triangulate
+    from damageest_cadquery.cutting import _pieces
+    from damageest_cadquery.cutting.exact_damage import start_solids
+    from damageest_cadquery.solids.split import Tool, triangulate
     from test_cadquery_balance import cut_off, mesh_part
 
     lost = cut_off(mesh_part(cq.Workplane().cylinder(20, 10), 0.01), -20.0)
@@ -132,7 +132,7 @@ def test_a_piece_that_is_not_valid_is_refused_before_it_is_triangulated(monkeypa
 
 def make_bulge() -> Any:
     """A cube of 20 whose edge at y = z = 10 bulges from its two faces, and claims that it does not."""
-    from damageest_cadquery._read import explore
+    from damageest_cadquery.reading.read import explore
     from OCP.BRep import BRep_Builder, BRep_Tool
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.Geom import Geom_BSplineCurve
@@ -160,8 +160,8 @@ def make_bulge() -> Any:
 
 
 def test_faults_of_the_file_that_no_cut_touches_are_no_faults_of_the_cut() -> None:
-    from damageest_cadquery._solids import explore_faces
-    from damageest_cadquery._split import Tool, is_sound, measure_volume, split
+    from damageest_cadquery.solids.joining import explore_faces
+    from damageest_cadquery.solids.split import Tool, is_sound, measure_volume, split
     from OCP.BRepCheck import BRepCheck_Analyzer
 
     solid = make_bulge()
@@ -184,7 +184,7 @@ def test_faults_of_the_file_that_no_cut_touches_are_no_faults_of_the_cut() -> No
 
 
 def test_a_coarser_fuzzy_value_is_tried_where_edges_claim_as_much() -> None:
-    from damageest_cadquery._claims import COARSE, find_coarse
+    from damageest_cadquery.reading.claims import COARSE, find_coarse
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.ShapeFix import ShapeFix_ShapeTolerance
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 import numpy as np
-from damageest_cadquery._compare_stock import _leave_touching
+from damageest_cadquery.stock._compare import _leave_touching
 from manifold3d import Manifold
 
 from damageest.artefacts import Part, Solid

@@ -28,8 +28,8 @@ def make_solid(*blocks: Any) -> Any:
 
 
 def test_faces_that_cross_near_the_damage_are_found() -> None:
-    from damageest_cadquery._crossed import find_crossed
-    from damageest_cadquery._exact import start_solids
+    from damageest_cadquery.cutting.crossed import find_crossed
+    from damageest_cadquery.cutting.exact_damage import start_solids
     from test_cadquery_balance import cut_off, mesh_part
 
     block = cq.Workplane().box(30, 20, 12)
@@ -51,8 +51,8 @@ def test_faces_that_cross_near_the_damage_are_found() -> None:
 
 
 def test_solids_that_overlap_are_no_fault_of_their_faces() -> None:
-    from damageest_cadquery._crossed import find_crossed
-    from damageest_cadquery._exact import start_solids
+    from damageest_cadquery.cutting.crossed import find_crossed
+    from damageest_cadquery.cutting.exact_damage import start_solids
     from test_cadquery_balance import cut_off, mesh_part
 
     block = cq.Workplane().box(30, 20, 12)

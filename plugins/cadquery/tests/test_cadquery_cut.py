@@ -19,7 +19,7 @@ TOLERANCE = 0.5
 def test_the_cut_of_one_site_does_not_reach_that_of_another() -> None:
     """One enclosure cuts the ends off two legs 1 mm apart; of its surface, three rings of 1 mm about a site reach the
     other leg."""
-    from damageest_cadquery._cut import make_cut
+    from damageest_cadquery.surfaces.open_surface import make_cut
     from test_cadquery_balance import mesh_part
 
     legs = cq.Workplane().box(40, 21, 10).cut(cq.Workplane().box(40, 1, 10).translate((10, 0, 0)))

@@ -10,13 +10,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_cadquery._deposit import find_deposit
-from damageest_cadquery._exact import start_solids
-from damageest_cadquery._faces import list_faces
-from damageest_cadquery._read import read
-from damageest_cadquery._solids import StockError, explore_faces
-from damageest_cadquery._split import Piece, find_corners, measure_volume
-from damageest_cadquery._stock import Base, build_parts, build_stock, take_bases
+from damageest_cadquery.cutting.exact_damage import start_solids
+from damageest_cadquery.reading.list_faces import list_faces
+from damageest_cadquery.reading.read import read
+from damageest_cadquery.solids.joining import StockError, explore_faces
+from damageest_cadquery.solids.split import Piece, find_corners, measure_volume
+from damageest_cadquery.stock.deposit import find_deposit
+from damageest_cadquery.stock.offset_faces import Base, build_parts, build_stock, take_bases
 
 import damageest
 from damageest.artefacts import Deposit
@@ -133,7 +133,7 @@ def test_stock_on_a_cone_beyond_its_apex_lies_outside() -> None:
 
 
 def test_mitres_that_share_a_corner_but_for_rounding_errors_are_filled() -> None:
-    from damageest_cadquery._stock import merge_points
+    from damageest_cadquery.stock.offset_faces import merge_points
 
     corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1], [0, 0, 1 + 1e-9], [1, 1e-9, 0]], float)
     assert merge_points(corners, 1e-4).tolist() == corners[:4].tolist()
@@ -248,7 +248,7 @@ def take_pit(radius: float, top: int, place: tuple[float, float] = (2, 3)) -> Pi
 @pytest.mark.slow
 def test_stock_on_another_outline_is_compared_on_its_own_skin(done: Run) -> None:
     """The exact pit is wider by two tolerances, as where the mesh does not show how a loss fades out."""
-    from damageest_cadquery._compare_stock import compare_stock
+    from damageest_cadquery.stock._compare import compare_stock
 
     site, part = done.result.sites[0], done.result.part
     deposit = site.deposit

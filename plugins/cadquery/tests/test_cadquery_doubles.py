@@ -18,9 +18,9 @@ TOLERANCE = 0.2
 
 def find(blocks: list[Any], monkeypatch: pytest.MonkeyPatch) -> tuple[Any, tuple[str, ...]]:
     """The exact form of what lies beyond x = 12 of a block of 30 x 20 x 12, whose file holds these solids."""
-    from damageest_cadquery import _exact
-    from damageest_cadquery._attempts import Attempt
-    from damageest_cadquery._split import Tool
+    from damageest_cadquery.cutting import exact_damage as _exact
+    from damageest_cadquery.cutting._attempts import Attempt
+    from damageest_cadquery.solids.split import Tool
     from test_cadquery_balance import cut_off, mesh_part
 
     part = mesh_part(cq.Workplane().box(30, 20, 12), 0.1)
@@ -40,7 +40,7 @@ def find(blocks: list[Any], monkeypatch: pytest.MonkeyPatch) -> tuple[Any, tuple
 
 
 def test_metal_that_a_file_holds_twice_is_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    from damageest_cadquery._split import measure_volume
+    from damageest_cadquery.solids.split import measure_volume
 
     whole = cq.Workplane().box(30, 20, 12)
     halves = [cq.Workplane().box(30, 10, 12).translate((0, y, 0)) for y in (-5, 5)]
@@ -55,9 +55,9 @@ def test_metal_that_a_file_holds_twice_is_taken_once(monkeypatch: pytest.MonkeyP
 def test_metal_that_solids_share_in_part_is_taken_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """The second solid's damage volume ends where the first has the metal: there it has a face of that, which gets no
     stock, since it is no skin of the part."""
-    from damageest_cadquery._doubles import SHARED
-    from damageest_cadquery._split import find_corners, is_sound, measure_volume
-    from damageest_cadquery._stock import take_bases
+    from damageest_cadquery.solids.doubles import SHARED
+    from damageest_cadquery.solids.split import find_corners, is_sound, measure_volume
+    from damageest_cadquery.stock.offset_faces import take_bases
 
     halves = [cq.Workplane().box(30, 14, 12).translate((0, y, 0)) for y in (-3, 3)]
     found, tried = find(halves, monkeypatch)
@@ -77,8 +77,8 @@ def test_metal_that_solids_share_in_part_is_taken_once(monkeypatch: pytest.Monke
 
 
 def test_stock_on_a_face_of_the_other_solid_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    from damageest_cadquery._deposit import refuse_doubles
-    from damageest_cadquery._solids import StockError
+    from damageest_cadquery.solids.joining import StockError
+    from damageest_cadquery.stock.deposit import refuse_doubles
     from test_cadquery_balance import cut_off, mesh_part
 
     from damageest.artefacts import Deposit

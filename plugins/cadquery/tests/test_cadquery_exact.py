@@ -12,11 +12,11 @@ import cadquery_faults
 import numpy as np
 import pytest
 from damageest_cadquery import exact
-from damageest_cadquery._assembly import NamedShape, write_assembly
 from damageest_cadquery._kept import keep_made
-from damageest_cadquery._read import read
 from damageest_cadquery._request import Made
-from damageest_cadquery._split import measure_volume
+from damageest_cadquery.reading.read import read
+from damageest_cadquery.solids.split import measure_volume
+from damageest_cadquery.writing.assembly import NamedShape, write_assembly
 
 import damageest
 from damageest.errors import InputError
@@ -92,8 +92,8 @@ def test_a_ball_mark_is_a_sphere_and_a_notch_is_planes(done: Run) -> None:
 
 
 def test_outer_faces_keep_names_and_colours(done: Run) -> None:
-    from damageest_cadquery._colours import read_colours
-    from damageest_cadquery._faces import list_faces
+    from damageest_cadquery.reading.colours import read_colours
+    from damageest_cadquery.reading.list_faces import list_faces
 
     path = done.folder / "damage/site-1.step"
     listed = list_faces(read(path, ".step"), 1.0)
@@ -376,8 +376,8 @@ def test_a_mesh_has_no_exact_form(done: Run, tmp_path: Path) -> None:
 
 
 def test_a_wrong_volume_is_refused(done: Run) -> None:
-    from damageest_cadquery._check import Target, check_pieces
-    from damageest_cadquery._exact import start_solids
+    from damageest_cadquery.cutting.check_pieces import Target, check_pieces
+    from damageest_cadquery.cutting.exact_damage import start_solids
 
     part = done.result.part
     solids, faces = start_solids(read(Path(part.path), ".step").solids)

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_cadquery._edges import find_edges
-from damageest_cadquery._join_stock import Lump, sew_groups
-from damageest_cadquery._solids import StockError, explore_faces, naming
-from damageest_cadquery._split import measure_volume, triangulate
-from damageest_cadquery._stock import Base, build_parts, build_stock
+from damageest_cadquery.solids.joining import StockError, explore_faces, naming
+from damageest_cadquery.solids.split import measure_volume, triangulate
+from damageest_cadquery.stock._edges import find_edges
+from damageest_cadquery.stock._join import Lump, sew_groups
+from damageest_cadquery.stock.offset_faces import Base, build_parts, build_stock
 
 from tests.needs import import_for, needs_plugin
 

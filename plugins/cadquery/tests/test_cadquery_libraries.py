@@ -8,8 +8,9 @@ from pathlib import Path
 
 import damageest_cadquery
 import pytest
-from damageest_cadquery import _read, _system
+from damageest_cadquery import _system
 from damageest_cadquery.brep import Brep
+from damageest_cadquery.reading import read as _read
 
 from damageest.errors import JobError, PluginError, StageError
 from damageest.job import load

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_cadquery._adapted import require_sound
-from damageest_cadquery._interpolate import Breaks, evaluate, interpolate_curve
-from damageest_cadquery._moved import MoveError, move_solid
-from damageest_cadquery._read import explore
-from damageest_cadquery._split import measure_volume, triangulate
+from damageest_cadquery.moving._interpolate import Breaks, evaluate, interpolate_curve
+from damageest_cadquery.moving.adapted import require_sound
+from damageest_cadquery.moving.moved import MoveError, move_solid
+from damageest_cadquery.reading.read import explore
+from damageest_cadquery.solids.split import measure_volume, triangulate
 
 from damageest.artefacts import DisplacementField, Floats, Solid
 from damageest.geometry.distance import distance_to_mesh

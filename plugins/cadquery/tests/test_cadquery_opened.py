@@ -10,11 +10,11 @@ from typing import Any
 import cadquery_faults
 import pytest
 from damageest_cadquery import exact
-from damageest_cadquery._faces import list_faces
-from damageest_cadquery._opened import find_milled
-from damageest_cadquery._read import read
-from damageest_cadquery._solids import StockError
-from damageest_cadquery._split import measure_volume, triangulate
+from damageest_cadquery.reading.list_faces import list_faces
+from damageest_cadquery.reading.read import read
+from damageest_cadquery.solids.joining import StockError
+from damageest_cadquery.solids.split import measure_volume, triangulate
+from damageest_cadquery.stock.opened import find_milled
 
 import damageest
 from damageest.artefacts import Deposit
@@ -176,10 +176,10 @@ def test_metal_of_another_volume_is_refused(opened: Run) -> None:
 
 def cut_ball(box: Any, radius: float) -> Any:
     """An exact pit in the top of a block."""
-    from damageest_cadquery._check import Measured
-    from damageest_cadquery._exact import Exact
-    from damageest_cadquery._solids import explore_faces
-    from damageest_cadquery._split import Piece
+    from damageest_cadquery.cutting.check_pieces import Measured
+    from damageest_cadquery.cutting.exact_damage import Exact
+    from damageest_cadquery.solids.joining import explore_faces
+    from damageest_cadquery.solids.split import Piece
 
     solid = box.intersect(cq.Workplane().sphere(radius).translate((2, 3, 6))).val().Solids()[0].wrapped
     flat = [cq.Face(face).Center().z > 5.99 for face in explore_faces(solid)]

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from damageest_cadquery._patch import write_patch
+from damageest_cadquery.writing.patch import write_patch
 
 from damageest.artefacts import Surface
 from damageest.geometry.units import MILLIMETRES

@@ -9,8 +9,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from damageest_cadquery._part21 import Ref, Typed, read_entities
 from damageest_cadquery.brep import Brep
+from damageest_cadquery.reading._part21 import Ref, Typed, read_entities
 from hypothesis import given
 from hypothesis import strategies as st
 from typer.testing import CliRunner

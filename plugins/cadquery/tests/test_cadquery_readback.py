@@ -48,15 +48,15 @@ def make_wave(multiplicity: int, height: float) -> Any:
 
 
 def name(shape: Any, title: str) -> Any:
-    from damageest_cadquery._assembly import NamedShape
-    from damageest_cadquery._solids import explore_faces
+    from damageest_cadquery.solids.joining import explore_faces
+    from damageest_cadquery.writing.assembly import NamedShape
 
     count = len(explore_faces(shape))
     return NamedShape(title, shape, GREY, [f"{title} {k}" for k in range(count)], [GREEN] * count)
 
 
 def write(folder: Path, shapes: list[Any]) -> tuple[Any, Path]:
-    from damageest_cadquery._files import write_shapes
+    from damageest_cadquery.writing.write_shapes import write_shapes
 
     (folder / "scratch").mkdir()
     done = write_shapes(folder / "scratch/a.step", folder / "a.step", "all", shapes, "mm", 0.02)
@@ -72,8 +72,8 @@ def take_solids(path: Path) -> list[Any]:
 @pytest.mark.parametrize(("multiplicity", "height"), [(1, 1.0), pytest.param(3, 0.03, marks=pytest.mark.slow)])
 def test_stock_on_a_spline_is_a_solid_in_the_file(multiplicity: int, height: float, tmp_path: Path) -> None:
     """OpenCASCADE writes the offset of a surface with a crease, and does not read it: the solid would be lost."""
-    from damageest_cadquery._split import measure_volume
-    from damageest_cadquery._stock import _thicken
+    from damageest_cadquery.solids.split import measure_volume
+    from damageest_cadquery.stock.offset_faces import _thicken
 
     stock = _thicken([make_wave(multiplicity, height)], HEIGHT)
     block = cq.Workplane().box(2, 3, 4).translate((30, 0, 0)).val().wrapped
@@ -90,7 +90,7 @@ def test_stock_on_a_spline_is_a_solid_in_the_file(multiplicity: int, height: flo
 @pytest.mark.slow
 def test_stock_that_no_way_can_write_is_left_out_and_said(tmp_path: Path) -> None:
     """Over a deep crease the offset has a gap, as a spline too, and its triangles do not close."""
-    from damageest_cadquery._stock import _thicken
+    from damageest_cadquery.stock.offset_faces import _thicken
 
     done, path = write(tmp_path, [name(_thicken([make_wave(3, 1.0)], HEIGHT), "stock")])
     assert done.made is None
@@ -101,7 +101,7 @@ def test_stock_that_no_way_can_write_is_left_out_and_said(tmp_path: Path) -> Non
 @pytest.mark.slow
 def test_only_the_solid_that_cannot_be_written_gets_facets(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A writer that loses one solid as long as it has CAD faces."""
-    from damageest_cadquery import _files
+    from damageest_cadquery.writing import write_shapes as _files
 
     whole, spare = _files._write, name(cq.Workplane().box(1, 1, 1).val().wrapped, "spare")
 
@@ -123,16 +123,16 @@ def test_only_the_solid_that_cannot_be_written_gets_facets(tmp_path: Path, monke
 
 
 def list_names(path: Path) -> list[str]:
-    from damageest_cadquery._faces import list_faces
-    from damageest_cadquery._read import read
+    from damageest_cadquery.reading.list_faces import list_faces
+    from damageest_cadquery.reading.read import read
 
     return [face.name for face in list_faces(read(path, ".step"), 1.0)]
 
 
 def test_a_file_without_what_it_is_to_hold_is_not_moved(tmp_path: Path) -> None:
     """Every way gives another fault, and none of them a file."""
-    from damageest_cadquery._files import join_shapes
-    from damageest_cadquery._step import Way, write_first, write_shape
+    from damageest_cadquery.writing.step import Way, write_first, write_shape
+    from damageest_cadquery.writing.write_shapes import join_shapes
 
     box = cq.Workplane().box(1, 2, 3).val()
     shapes = {
@@ -167,7 +167,7 @@ def test_a_file_without_what_it_is_to_hold_is_not_moved(tmp_path: Path) -> None:
 
 def test_a_file_that_others_may_refuse_has_another_name(tmp_path: Path) -> None:
     """All volume is in it, in one solid for two: a reader that looks for a file of the usual name finds none."""
-    from damageest_cadquery._step import Way, write_first
+    from damageest_cadquery.writing.step import Way, write_first
 
     two = cq.Workplane().box(2, 2, 2).union(cq.Workplane().box(2, 2, 2).translate((2, 0, 0)), clean=True).val()
     halves = cq.Compound.makeCompound([cq.Workplane().box(2, 2, 2).translate((k, 0, 0)).val() for k in (0, 2)])
@@ -179,7 +179,7 @@ def test_a_file_that_others_may_refuse_has_another_name(tmp_path: Path) -> None:
 
 
 def copy(path: Path, shape: Any) -> None:
-    from damageest_cadquery._step import write_shape
+    from damageest_cadquery.writing.step import write_shape
 
     write_shape(path, shape, "copy", "mm")
 
@@ -198,9 +198,9 @@ def move_faces() -> Any:
 
 
 def test_faces_with_a_place_of_their_own_keep_names_and_colours(tmp_path: Path) -> None:
-    from damageest_cadquery._colours import read_colours
-    from damageest_cadquery._faces import list_faces
-    from damageest_cadquery._read import read
+    from damageest_cadquery.reading.colours import read_colours
+    from damageest_cadquery.reading.list_faces import list_faces
+    from damageest_cadquery.reading.read import read
 
     shape = move_faces()
     faces = cq.Shape.cast(shape).Faces()
@@ -220,7 +220,7 @@ NAMES = ["plain", "deposit site-1 2", "it's 'so'", "a; #7 = PRODUCT(x 1)", "long
 
 @pytest.mark.parametrize("title", NAMES)
 def test_products_keep_their_four_arguments(title: str, tmp_path: Path) -> None:
-    from damageest_cadquery._step import write_shape
+    from damageest_cadquery.writing.step import write_shape
 
     box = cq.Workplane().box(1, 2, 3).val().wrapped
     for number in range(2):  # OpenCASCADE counts the products of a process
@@ -257,7 +257,7 @@ def add_sliver(height: float) -> Solid:
 
 @pytest.mark.parametrize("height", [0.0, 1e-12, 1e-9])
 def test_slivers_are_left_out(height: float, tmp_path: Path) -> None:
-    from damageest_cadquery._step import write_step
+    from damageest_cadquery.writing.step import write_step
 
     made = add_sliver(height)
     done = write_step(tmp_path, "a", [Body("a", made, GREY)], "mm")
@@ -267,7 +267,7 @@ def test_slivers_are_left_out(height: float, tmp_path: Path) -> None:
 
 def test_a_needle_has_its_triangles_as_faces() -> None:
     """All of it is one flat region within rounding, which has no outline."""
-    from damageest_cadquery._facets import find_facets, straighten
+    from damageest_cadquery.solids.facets import find_facets, straighten
 
     corners = np.array([[20, 0, 0], [30, 0, 0], [25, 1e-9, 0], [24, 0, 1e-9]])
     needle = Solid(corners, np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]]))
@@ -276,7 +276,7 @@ def test_a_needle_has_its_triangles_as_faces() -> None:
 
 
 def test_bodies_that_touch_in_a_point_are_solids_of_their_own(tmp_path: Path) -> None:
-    from damageest_cadquery._step import write_step
+    from damageest_cadquery.writing.step import write_step
 
     vertices, faces = to_arrays(Manifold.cube((10, 10, 10)))
     move = np.array([10, 10, 10])
@@ -291,8 +291,8 @@ def test_bodies_that_touch_in_a_point_are_solids_of_their_own(tmp_path: Path) ->
 
 def test_where_integrals_are_wrong_triangles_decide(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """As over walls on cones: the same solid has other integrals in the file than before."""
-    from damageest_cadquery import _readback
-    from damageest_cadquery._assembly import NamedShape, write_assembly
+    from damageest_cadquery.writing import readback as _readback
+    from damageest_cadquery.writing.assembly import NamedShape, write_assembly
 
     shapes = [cq.Workplane().box(10, 10, height).val().wrapped for height in (10, 10.1)]
     write_assembly(tmp_path / "a.step", "a", [NamedShape("a", shapes[0], GREY)], "mm")

@@ -87,9 +87,9 @@ def write_job(name: str, case: Case) -> dict[str, object]:
 def measure_file(path: Path, chord: float) -> tuple[float, float]:
     """The volume of a STEP file's solids, by triangles, and the area of their curved faces that are the part's; all
     solids are valid and closed, and their faces have names."""
-    from damageest_cadquery._faces import list_faces
-    from damageest_cadquery._read import explore, read
-    from damageest_cadquery._split import triangulate
+    from damageest_cadquery.reading.list_faces import list_faces
+    from damageest_cadquery.reading.read import explore, read
+    from damageest_cadquery.solids.split import triangulate
     from OCP.BRep import BRep_Tool
     from OCP.BRepCheck import BRepCheck_Analyzer
     from OCP.TopAbs import TopAbs_SHELL

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 from damageest_cadquery import exact
-from damageest_cadquery._read import explore, read
-from damageest_cadquery._split import measure_volume
+from damageest_cadquery.reading.read import explore, read
+from damageest_cadquery.solids.split import measure_volume
 
 import damageest
 from tests.needs import import_for, needs_plugin

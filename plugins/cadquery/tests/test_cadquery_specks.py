@@ -22,9 +22,9 @@ def test_a_small_body_of_the_damage_is_no_cut_elsewhere(
     size: tuple[float, float, float], kept: list[float], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A corner of 0.0005 of the damage volume. Where its inner faces are the only ones near the mesh's, it is kept."""
-    from damageest_cadquery import _exact
-    from damageest_cadquery._attempts import Attempt
-    from damageest_cadquery._split import Tool, measure_volume
+    from damageest_cadquery.cutting import exact_damage as _exact
+    from damageest_cadquery.cutting._attempts import Attempt
+    from damageest_cadquery.solids.split import Tool, measure_volume
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound
     from test_cadquery_balance import mesh_part
@@ -65,7 +65,8 @@ def test_a_small_body_of_the_damage_is_no_cut_elsewhere(
 
 
 def test_triangles_that_do_not_close_are_made_once_more_of_half_the_chord(monkeypatch: pytest.MonkeyPatch) -> None:
-    from damageest_cadquery import _split, _tessellate
+    from damageest_cadquery.reading import tessellate as _tessellate
+    from damageest_cadquery.solids import split as _split
 
     made, tried = _tessellate.tessellate, []
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_cadquery import _step
-from damageest_cadquery._facets import find_facets
+from damageest_cadquery.solids.facets import find_facets
+from damageest_cadquery.writing import step as _step
 from manifold3d import Manifold
 
 from damageest.artefacts import Solid

@@ -46,13 +46,13 @@ def make_cap(radius: float = 5.0, low: float = 0.0) -> Mesh:
 
 def make_cut_of(mesh: Mesh) -> Any:
     """A cut all of which lies inside the part."""
-    from damageest_cadquery._cut import Cut
+    from damageest_cadquery.surfaces.open_surface import Cut
 
     return Cut(mesh, np.full(len(mesh.vertices), -1.0), np.ones(len(mesh.faces), bool))
 
 
 def test_planes_and_a_ball_are_recognised() -> None:
-    from damageest_cadquery._shapes import find_shapes
+    from damageest_cadquery.surfaces.recognised import find_shapes
 
     found = find_shapes(make_valley(), TOLERANCE)
     assert found.whole
@@ -66,7 +66,7 @@ def test_planes_and_a_ball_are_recognised() -> None:
 
 
 def test_a_rough_surface_is_made_of_nothing() -> None:
-    from damageest_cadquery._shapes import find_shapes
+    from damageest_cadquery.surfaces.recognised import find_shapes
 
     points, faces = make_grid(61, 12.0)
     points[:, 2] = np.sin(2 * points[:, 0]) * np.cos(1.7 * points[:, 1]) + 0.3 * np.sin(5 * points[:, 1])
@@ -74,9 +74,9 @@ def test_a_rough_surface_is_made_of_nothing() -> None:
 
 
 def test_two_planes_become_two_faces_with_a_sharp_edge() -> None:
-    from damageest_cadquery._flat_faces import find_flat_faces
-    from damageest_cadquery._polyhedron import decimate, fit, mark_planes
-    from damageest_cadquery._shapes import find_shapes
+    from damageest_cadquery.surfaces.flat_faces import find_flat_faces
+    from damageest_cadquery.surfaces.polyhedron import decimate, fit, mark_planes
+    from damageest_cadquery.surfaces.recognised import find_shapes
 
     valley = make_valley()
     found, cut = find_shapes(valley, TOLERANCE), make_cut_of(valley)
@@ -92,8 +92,8 @@ def test_two_planes_become_two_faces_with_a_sharp_edge() -> None:
 
 
 def test_facets_of_a_ball_are_as_near_as_they_are_many_and_cover_it_once() -> None:
-    from damageest_cadquery._flat_faces import find_flat_faces
-    from damageest_cadquery._polyhedron import decimate, fit, mark_planes
+    from damageest_cadquery.surfaces.flat_faces import find_flat_faces
+    from damageest_cadquery.surfaces.polyhedron import decimate, fit, mark_planes
 
     cap = make_cap()
     cut = make_cut_of(cap)
@@ -116,8 +116,8 @@ def test_facets_of_a_ball_are_as_near_as_they_are_many_and_cover_it_once() -> No
 
 @pytest.mark.parametrize("hole", [False, True])
 def test_a_hemisphere_spreads_over_the_disk_without_a_fold(hole: bool) -> None:
-    from damageest_cadquery._cut import take_faces
-    from damageest_cadquery._flatten import flatten
+    from damageest_cadquery.surfaces._flatten import flatten
+    from damageest_cadquery.surfaces.open_surface import take_faces
 
     cap = make_cap()
     if hole:
@@ -131,14 +131,14 @@ def test_a_hemisphere_spreads_over_the_disk_without_a_fold(hole: bool) -> None:
 
 
 def test_a_closed_surface_does_not_spread() -> None:
-    from damageest_cadquery._flatten import flatten
+    from damageest_cadquery.surfaces._flatten import flatten
 
     assert flatten(make_cap(low=-9)) is None
 
 
 @pytest.mark.parametrize("count", [3, 6, 8])
 def test_a_surface_with_a_short_rim_is_flattened(count: int) -> None:
-    from damageest_cadquery._flatten import flatten
+    from damageest_cadquery.surfaces._flatten import flatten
 
     angle = 2 * np.pi * np.arange(count) / count
     rim = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(count)])
@@ -150,8 +150,8 @@ def test_a_surface_with_a_short_rim_is_flattened(count: int) -> None:
 
 
 def test_tails_along_the_skin_are_dropped() -> None:
-    from damageest_cadquery._cut import take_faces
-    from damageest_cadquery._spline import drop_tails
+    from damageest_cadquery.surfaces.open_surface import take_faces
+    from damageest_cadquery.surfaces.splines import drop_tails
 
     points, faces = make_grid(81, 16.0)
     middle = points[faces].mean(axis=1)
@@ -163,7 +163,7 @@ def test_tails_along_the_skin_are_dropped() -> None:
 
 
 def test_step_entities_in_another_order_give_the_same_bytes(tmp_path: Path) -> None:
-    from damageest_cadquery._canonical import canonicalise
+    from damageest_cadquery.writing._canonical import canonicalise
 
     cq.exporters.export(cq.Workplane().box(3, 2, 1).faces(">Z").hole(0.5), str(tmp_path / "a.step"))
     text = (tmp_path / "a.step").read_text()
@@ -189,8 +189,8 @@ def test_step_entities_in_another_order_give_the_same_bytes(tmp_path: Path) -> N
 
 def test_nothing_hangs_in_the_pieces_of_a_split() -> None:
     """Two faces that overlap beyond their common edge, in the shape of a T."""
-    from damageest_cadquery._exact import start_solids
-    from damageest_cadquery._split import Tool, is_sound, measure_volume, split
+    from damageest_cadquery.cutting.exact_damage import start_solids
+    from damageest_cadquery.solids.split import Tool, is_sound, measure_volume, split
     from OCP.BRep import BRep_Builder
     from OCP.TopoDS import TopoDS_Compound
 
@@ -210,8 +210,8 @@ def test_nothing_hangs_in_the_pieces_of_a_split() -> None:
 
 def test_the_volume_of_a_twisted_blade_is_that_of_a_fine_mesh() -> None:
     """OpenCASCADE's own, with a fixed number of points, is 7 % lower."""
-    from damageest_cadquery._split import measure_volume, triangulate
     from damageest_cadquery.evaluate.parts import make_blade
+    from damageest_cadquery.solids.split import measure_volume, triangulate
 
     blade = make_blade().val().wrapped
     assert measure_volume(blade) == pytest.approx(triangulate(blade, 0.03, 0.2).volume, rel=2e-3)
@@ -220,8 +220,8 @@ def test_the_volume_of_a_twisted_blade_is_that_of_a_fine_mesh() -> None:
 @pytest.mark.slow
 def test_a_picture_shows_faces_inside_in_red_and_others_not(tmp_path: Path) -> None:
     import pyvista as pv
-    from damageest_cadquery._assembly import NamedShape, write_assembly
     from damageest_cadquery.draw import main
+    from damageest_cadquery.writing.assembly import NamedShape, write_assembly
 
     shape = cq.Workplane().box(3, 3, 3).val()
     names = ["damage site-1 inner 1" if face.Center().z > 1.4 else "side" for face in shape.Faces()]
@@ -265,7 +265,7 @@ def test_a_case_of_the_evaluation_is_exact_and_read_back(tmp_path: Path) -> None
 def test_a_chart_without_an_outline_gets_no_spline(outline: list[list[float]]) -> None:
     """As where a folded piece of few triangles is flattened: its outline runs the wrong way round, or has no width."""
     import trimesh
-    from damageest_cadquery._spline import Chart, build_splines
+    from damageest_cadquery.surfaces.splines import Chart, build_splines
 
     points, faces = make_grid(10, 9.0)
     points[:, 2] = 0.01 * (points[:, 0] - 4.5) ** 2 - 3

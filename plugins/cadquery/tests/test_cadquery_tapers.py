@@ -32,9 +32,9 @@ def make_corner(more: float) -> Any:
 
 def test_an_edge_that_tapers_gets_a_mitre_that_tapers() -> None:
     """Where both fillets go over into the top, their common edge is smooth."""
-    from damageest_cadquery._edges import find_edges
-    from damageest_cadquery._split import is_watertight, measure_volume
-    from damageest_cadquery._stock import Base, build_parts, build_stock
+    from damageest_cadquery.solids.split import is_watertight, measure_volume
+    from damageest_cadquery.stock._edges import find_edges
+    from damageest_cadquery.stock.offset_faces import Base, build_parts, build_stock
 
     faces = make_corner(0.0).val().Solids()[0].Faces()
     bases = [
@@ -56,7 +56,7 @@ def test_an_edge_that_tapers_gets_a_mitre_that_tapers() -> None:
 
 def move_edge(step: float) -> Any:
     """A cylinder whose upper rim lies this far above its faces, and claims 1e-7."""
-    from damageest_cadquery._read import explore
+    from damageest_cadquery.reading.read import explore
     from OCP.BRep import BRep_Builder, BRep_Tool
     from OCP.BRepBuilderAPI import BRepBuilderAPI_Copy
     from OCP.gp import gp_Vec
@@ -73,7 +73,7 @@ def move_edge(step: float) -> Any:
 
 
 def test_an_edge_that_claims_too_little_is_settled_where_it_is_near() -> None:
-    from damageest_cadquery._solids import settle_edges
+    from damageest_cadquery.solids.joining import settle_edges
 
     assert settle_edges(move_edge(0.0))
     for step, wanted in ((2e-5, True), (0.05, False)):
@@ -84,7 +84,7 @@ def test_an_edge_that_claims_too_little_is_settled_where_it_is_near() -> None:
 
 
 def test_triangles_that_lie_on_each_other_are_dropped() -> None:
-    from damageest_cadquery._folds import drop_folds
+    from damageest_cadquery.solids._folds import drop_folds
 
     faces = np.array([[13, 1, 34], [33, 1, 34], [1, 33, 34], [34, 1, 35], [1, 2, 3], [2, 1, 3]])
     number = np.array([1, 1, 1, 1, 1, 2])
@@ -92,8 +92,8 @@ def test_triangles_that_lie_on_each_other_are_dropped() -> None:
 
 
 def test_a_surface_of_which_a_vertex_joins_two_sheets_is_simplified() -> None:
-    from damageest_cadquery._flat_faces import Flat
-    from damageest_cadquery._polyhedron import decimate, split_sheets
+    from damageest_cadquery.surfaces.flat_faces import Flat
+    from damageest_cadquery.surfaces.polyhedron import decimate, split_sheets
 
     count = 12
     x, y = np.meshgrid(np.arange(count, dtype=float), np.arange(count, dtype=float))
@@ -119,9 +119,9 @@ def test_a_mitre_whose_ends_are_not_flat_is_closed(bend: float) -> None:
     """As where an edge of a file does not lie quite on its faces, so that their normals lean along it."""
     from dataclasses import replace
 
-    from damageest_cadquery._edges import find_edges
-    from damageest_cadquery._mitre import build_mitre
-    from damageest_cadquery._split import measure_volume
+    from damageest_cadquery.solids.split import measure_volume
+    from damageest_cadquery.stock._edges import find_edges
+    from damageest_cadquery.stock._mitre import build_mitre
 
     faces = [face.wrapped for face in cq.Workplane().box(10, 10, 10).val().Faces()]
     edge = find_edges(faces)[0]
@@ -139,9 +139,9 @@ def test_a_mitre_whose_ends_are_not_flat_is_closed(bend: float) -> None:
 
 def test_a_mitre_that_reaches_beyond_the_axis_of_its_edge_folds() -> None:
     """Over the end of a concave fillet whose radius is less than the height of the stock."""
-    from damageest_cadquery._edges import find_edges
-    from damageest_cadquery._mitre import build_mitre
-    from damageest_cadquery._solids import StockError
+    from damageest_cadquery.solids.joining import StockError
+    from damageest_cadquery.stock._edges import find_edges
+    from damageest_cadquery.stock._mitre import build_mitre
 
     step = cq.Workplane("XZ").polyline([(0, 0), (20, 0), (20, 5), (10, 5), (10, 15), (0, 15)]).close().extrude(10)
     solid = step.edges(cq.selectors.BoxSelector((9, -20, 4), (11, 20, 6))).fillet(RADIUS)

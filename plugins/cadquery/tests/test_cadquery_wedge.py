@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_cadquery._solids import StockError, explore_faces
-from damageest_cadquery._split import measure_volume
-from damageest_cadquery._stock import Base, build_stock
-from damageest_cadquery._wedge import build_wedge, is_narrow
+from damageest_cadquery.solids.joining import StockError, explore_faces
+from damageest_cadquery.solids.split import measure_volume
+from damageest_cadquery.stock._wedge import build_wedge, is_narrow
+from damageest_cadquery.stock.offset_faces import Base, build_stock
 from hypothesis import given, settings
 from hypothesis import strategies as st
 

@@ -67,9 +67,9 @@ def wait_for(what: Any, seconds: float) -> None:
 def test_a_site_without_an_exact_form_costs_only_its_own_solid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Two solids, each with a bite; that of the round one gets facets."""
     from damageest_cadquery import exact
-    from damageest_cadquery._assembly import NamedShape, write_assembly
-    from damageest_cadquery._faces import list_faces
-    from damageest_cadquery._read import read
+    from damageest_cadquery.reading.list_faces import list_faces
+    from damageest_cadquery.reading.read import read
+    from damageest_cadquery.writing.assembly import NamedShape, write_assembly
 
     import damageest
 

@@ -1,0 +1,1 @@
+"""CAD solids that follow a part that was adapted to its scan."""

@@ -1,0 +1,1 @@
+"""OpenCASCADE solids: built of triangles, split, joined and measured."""

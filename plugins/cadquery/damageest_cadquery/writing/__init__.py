@@ -1,0 +1,1 @@
+"""Writes STEP files, and reads each back before it counts."""
