@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 
 from damageest.artefacts import Reason
 from damageest.errors import clean_message, is_interrupt
@@ -24,6 +25,20 @@ def ask_rules(rules: Iterable[Rule], site: SiteFacts, scan: ScanFacts) -> tuple[
         reason for rule in rules for reason in (ask_stranger(rule, site, scan) if rule.owner else rule.ask(site, scan))
     ]
     return tuple(sorted(dict.fromkeys(found), key=lambda reason: ORDER[reason.effect]))
+
+
+def ask_all(rules: Sequence[Rule], each: Sequence[SiteFacts], scan: ScanFacts) -> list[tuple[Reason, ...]]:
+    """The reasons of each site. Where others are contradicted, its rules are asked again and know of them."""
+    first = [ask_rules(rules, facts, scan) for facts in each]
+    is_out = [any(reason.effect == "contradicts" for reason in reasons) for reasons in first]
+    number, total = sum(is_out), sum(facts.volume for facts in each)
+    if number in (0, len(each)) or not total:
+        return first
+    share = sum(facts.volume for facts, out in zip(each, is_out, strict=True) if out) / total
+    return [
+        reasons if out else ask_rules(rules, replace(facts, contradicted=number, contradicted_share=share), scan)
+        for facts, reasons, out in zip(each, first, is_out, strict=True)
+    ]
 
 
 def ask_stranger(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Reason]:

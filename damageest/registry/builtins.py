@@ -77,6 +77,7 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.rules.covered import Covered
     from damageest.rules.dent import Dent
     from damageest.rules.displaced import Displaced
+    from damageest.rules.doubted_scan import DoubtedScan
     from damageest.rules.fading import FadingOut
     from damageest.rules.few_points import FewPoints
     from damageest.rules.free_pose import FreePoseRule
@@ -100,7 +101,7 @@ def damageest_rules() -> list[type[Rule]]:
     return [
         Nothing, Pieces, PoseDoubt, AdaptedSkin, Displaced, Revision, TwoSheets, MisplacedView, OneMotion, Scattered,
         OffBoundary, IntactInside, IntactOver, NotVisible, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered,
-        OtherMethod, FreePoseRule, FewPoints, FadingOut, Dent, Terms,
+        OtherMethod, DoubtedScan, FreePoseRule, FewPoints, FadingOut, Dent, Terms,
     ]  # fmt: skip
 
 

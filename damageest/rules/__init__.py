@@ -72,7 +72,9 @@ class SiteFacts:
     share of its rim beside skin that the scan does not show. ``two_sheets``: share of its points where the scan shows
     another surface above them, on the skin; ``misplaced``: share of its points that a misplaced view explains which was
     not moved; ``one_motion``: whether one motion of them all explains it; ``shifted``: the typical depth of the sites
-    of the scan that it explains. ``shallow``: number of shallow sites that are not much smaller. ``elsewhere``: share
+    of the scan that it explains. ``shallow``: number of shallow sites that are not much smaller. ``contradicted``:
+    number of other sites that a rule contradicts, and ``contradicted_share`` of all volume that was found in them; both
+    0 when a rule is asked first, and told when it is asked again. ``elsewhere``: share
     of its depth that a motion explains which puts no other skin outside. ``other_poses``: share of its skin that is not
     skin in another pose that fits as well. ``free``: motions that the scan leaves free. ``displaced``: numbers of the
     surplus as large as the loss, ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that
@@ -110,6 +112,8 @@ class SiteFacts:
     shut: float = 0.0
     turned: float = 0.0
     other_volume: float | None = None
+    contradicted: int = 0
+    contradicted_share: float = 0.0
 
 
 class Rule(ABC):

@@ -11,7 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from damageest.artefacts import Evidence, Reason
-from damageest.checks.verdict import ask_rules, decide, open_end
+from damageest.checks.verdict import ask_all, ask_rules, decide, open_end
 from damageest.findings import Fading, Uncertainty
 from damageest.registry import Registry
 from damageest.rules import FreePose, Rule, ScanFacts, SiteFacts
@@ -72,6 +72,20 @@ def test_each_rule_has_cases_and_says_what_it_means() -> None:
         assert rule.threshold
         assert any(case["effect"] for case in CASES[rule.code])
         assert any(case["effect"] is None for case in CASES[rule.code])
+
+
+@pytest.mark.parametrize(
+    ("volume", "number", "level"), [(20.0, 4, "doubtful"), (20.0, 3, "proven"), (1e3, 4, "proven")]
+)
+def test_a_small_site_is_doubted_where_nearly_all_that_was_found_is(volume: float, number: int, level: str) -> None:
+    """A large one beside small contradicted ones is not, and what is contradicted has no second reason."""
+    off = replace(
+        SITE, volume=200.0, interval=(196.0, 204.0), evidence=Evidence(causes=("residual",), ids_residual=0.5)
+    )
+    own = replace(SITE, volume=volume, interval=(0.98 * volume, 1.02 * volume))
+    *others, reasons = ask_all(list(RULES.values()), [off] * number + [own], SCAN)
+    assert decide(own.volume, own.interval, reasons).level == level
+    assert [[reason.code for reason in one] for one in others] == [["off_boundary"]] * number
 
 
 def test_a_plain_site_is_proven_without_reasons() -> None:

@@ -107,11 +107,14 @@ def write_inputs(case: DamageCase, folder: Path) -> tuple[Part, Scan]:
 
 
 def run_program(program: str, job: Path, out: Path, timeout: float) -> float:
-    """Processor seconds of one run, start included."""
+    """Processor seconds of one run, start included; infinite where it took longer than ``timeout`` seconds."""
     words = [program, "run", str(job), "-o", str(out), "--no-cache"]
     before = _count_children()
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONDONTWRITEBYTECODE"}
-    subprocess.run(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=timeout, env=environment)
+    try:
+        subprocess.run(words, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL, timeout=timeout, env=environment)
+    except subprocess.TimeoutExpired:
+        return float("inf")
     return _count_children() - before
 
 

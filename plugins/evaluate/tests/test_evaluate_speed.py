@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from damageest_evaluate.readme import make_marks
 from damageest_evaluate.speed import KINDS, make_speed_cases
-from damageest_evaluate.whole import LARGE, OWN, Run, make_whole_table
+from damageest_evaluate.whole import LARGE, OWN, Run, make_whole_table, run_program
 from evaluate_calls import evaluate
 from typer.testing import CliRunner
 
@@ -67,6 +67,16 @@ def test_the_least_of_each_case_and_the_median_of_the_common_ones_are_shown() ->
     assert ["block", "3.0", "6.0", "10.00", "2 likely, 1 proven"] in lines
     assert [LARGE, "20.0", "40.0", "5.00", ""] in lines
     assert lines[-1][:2] == ["median of the common runs", "4.0"]
+
+
+def test_a_run_beyond_its_time_is_a_row_and_no_end(tmp_path: Path) -> None:
+    program = tmp_path / "damageest"
+    program.write_text("#!/bin/sh\nexec sleep 60\n")
+    program.chmod(0o755)
+    seconds = run_program(str(program), tmp_path / "job.yaml", tmp_path / "out", 0.1)
+    assert seconds == float("inf")
+    rows = make_whole_table([Run("block", "new", seconds, 2.0, float("nan"), ())])
+    assert "| block | inf |" in rows
 
 
 @pytest.mark.slow
