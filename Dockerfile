@@ -26,7 +26,7 @@ FROM build AS build-core
 RUN /opt/uv/bin/uv sync --no-dev --no-editable --extra report
 
 FROM build AS build-all
-RUN /opt/uv/bin/uv sync --no-dev --no-editable --all-packages --all-extras
+RUN /opt/uv/bin/uv sync --no-dev --no-editable --all-packages --all-extras --no-install-package damageest-benchmarks
 
 # HOME is writable for every user, so that `--user` may name one that the image does not know.
 FROM base AS run

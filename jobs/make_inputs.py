@@ -6,8 +6,8 @@ from pathlib import Path
 
 import cadquery as cq
 import numpy as np
-from damageest_evaluate.differences import BALL, EARLY, LATE, Pair, draw_pair
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.differences import BALL, EARLY, LATE, Pair, draw_pair
+from damageest_benchmarks.parts import PARTS
 
 from damageest.artefacts import Part, Solid
 from damageest.geometry.solids import to_arrays, to_manifold

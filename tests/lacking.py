@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from tests.needs import PLUGINS, explain_import_error, find_unusable, import_or_skip
-from tests.optional_imports import ROOT
+from tests.needs import explain_import_error, find_unusable, import_or_skip
+from tests.optional_imports import PROJECTS, ROOT
 
-PLUGIN_TESTS = {ROOT / "plugins" / plugin / "tests": plugin for plugin in PLUGINS}
+PLUGIN_TESTS = {folder / "tests": plugin for plugin, folder in PROJECTS.items()}
 
 
 def pytest_configure(config: pytest.Config) -> None:
@@ -51,5 +51,5 @@ def _is_of_tests(error: ImportError) -> bool:
     """Whether the last statement of this repository that led to the error stands in a file of tests."""
     files = [Path(frame.filename) for frame in traceback.extract_tb(error.__traceback__)]
     own = [file.relative_to(ROOT).parts for file in files if file.is_relative_to(ROOT)]
-    own = [parts for parts in own if parts[0] in ("damageest", "tests", "plugins")]
+    own = [parts for parts in own if parts[0] in ("damageest", "tests", "plugins", "benchmarks")]
     return bool(own) and "tests" in own[-1]

@@ -11,16 +11,15 @@ import importlib
 import os
 from functools import cache
 from importlib.util import find_spec
-from pathlib import Path
 from typing import Any
 
 import pytest
 
 from damageest.errors import PluginError, describe_missing_library, find_missing_library
-from tests.optional_imports import list_optional, list_required
+from tests.optional_imports import PROJECTS, list_optional, list_required
 
-PLUGINS = tuple(sorted(path.parent.name for path in (Path(__file__).parents[1] / "plugins").glob("*/pyproject.toml")))
-"""The short names of this repository's plugins: their folders."""
+PLUGINS = tuple(PROJECTS)
+"""The short names of this repository's plugins and of its benchmarks: their folders."""
 
 
 @cache

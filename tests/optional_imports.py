@@ -12,6 +12,10 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 
+PROJECTS = {path.parent.name: path.parent for path in sorted(ROOT.glob("plugins/*/pyproject.toml"))}
+PROJECTS |= {"benchmarks": ROOT / "benchmarks"}
+"""The folders of the packages beside the core, by the end of their name: the plugins, and the benchmarks."""
+
 NEEDED_BY_TESTS = frozenset({"pytest", "pytest-xdist", "pytest-timeout", "hypothesis"})
 """Without these no test runs."""
 
@@ -48,7 +52,7 @@ def list_required(plugin: str) -> tuple[str, ...]:
     """The modules of the packages that a plugin requires beside the core."""
     optional = list_optional()
     core = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
-    lines = tomllib.loads((ROOT / "plugins" / plugin / "pyproject.toml").read_text())["project"]["dependencies"]
+    lines = tomllib.loads((PROJECTS[plugin] / "pyproject.toml").read_text())["project"]["dependencies"]
     for line in list(lines):
         if line.startswith("damageest["):
             for extra in line.partition("[")[2].partition("]")[0].split(","):
@@ -62,7 +66,7 @@ def list_optional() -> dict[str, tuple[str, ...]]:
     """The packages that are neither the core's nor needed by every test, each with the modules that it brings."""
     core: set[str] = set()
     named: set[str] = set()
-    for path in (ROOT / "pyproject.toml", *sorted(ROOT.glob("plugins/*/pyproject.toml"))):
+    for path in (ROOT / "pyproject.toml", *(folder / "pyproject.toml" for folder in PROJECTS.values())):
         content = tomllib.loads(path.read_text())
         project = content["project"]
         required = {name_distribution(line) for line in project["dependencies"]}
@@ -108,8 +112,8 @@ def map_modules() -> dict[str, Path]:
     found: dict[str, Path] = {}
     for base, folders in (
         (ROOT, [ROOT / "damageest", ROOT / "tests"]),
-        *((path.parent, [path]) for path in sorted(ROOT.glob("plugins/*/damageest_*"))),
-        *((path, [path]) for path in sorted(ROOT.glob("plugins/*/tests"))),
+        *((place, list(place.glob("damageest_*"))) for place in PROJECTS.values()),
+        *((place / "tests", [place / "tests"]) for place in PROJECTS.values()),
     ):
         for path in (path for folder in folders for path in folder.rglob("*.py")):
             parts = path.relative_to(base).with_suffix("").parts

@@ -1,4 +1,4 @@
-"""The source files of the package and of its plugins, and what they import."""
+"""The source files of the package, of its plugins and benchmarks, and what they import."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 PLUGIN_SOURCES = sorted((ROOT / "plugins").glob("*/damageest_*/**/*.py"))
-SOURCES = sorted([*(ROOT / "damageest").rglob("*.py"), *PLUGIN_SOURCES])
+BENCHMARKS = sorted((ROOT / "benchmarks" / "damageest_benchmarks").rglob("*.py"))
+SOURCES = sorted([*(ROOT / "damageest").rglob("*.py"), *PLUGIN_SOURCES, *BENCHMARKS])
 STATEMENT = re.compile(r"^[ \t]*(?:from[ \t]+\S+[ \t]+import\b[ \t]*(?:\([^)]*\)|.*)|import[ \t]+\w.*)", re.MULTILINE)
 """A statement that imports. Formatted sources have one statement a line, so that files need not be parsed as a whole,
 which takes seconds for all of them."""

@@ -12,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.needs import PLUGINS
-from tests.optional_imports import ROOT, list_optional, list_required
+from tests.optional_imports import PROJECTS, ROOT, list_optional, list_required
 
 OPTIONAL = list_optional()
 NATIVE = ("cadquery", "open3d-cpu", "pymeshlab", "pyvista", "vtk", "python-fcl", "numba")
@@ -22,7 +21,7 @@ LIBRARY = "libGL.so.1"
 LIBRARIES = ("libGL.so.1", "libEGL.so.1", "libX11.so.6", "libOpenGL.so.0")
 TEXTS = {
     path: path.read_text()
-    for folder in ("tests", "plugins")
+    for folder in ("tests", "plugins", "benchmarks")
     for path in sorted((ROOT / folder).rglob("*.py"))
     if "tests" in path.parts and path.stem not in ("test_collection", "test_optional_imports")
 }
@@ -52,7 +51,7 @@ def list_users(package: str) -> list[str]:
     """The files of tests that import a package, themselves or by a file of helpers, and those of the plugins that
     require it."""
     modules = OPTIONAL[package]
-    plugins = [ROOT / "plugins" / name / "tests" for name in PLUGINS if set(modules) & set(list_required(name))]
+    plugins = [folder / "tests" for name, folder in PROJECTS.items() if set(modules) & set(list_required(name))]
     found = {path for path in TEXTS if path.parent not in plugins and _imports(path, modules)}
     helpers = tuple(path.stem for path in found if not path.stem.startswith("test_"))
     found |= {path for path in TEXTS if helpers and path.parent not in plugins and _imports(path, helpers)}

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 import typer
-from damageest_evaluate.readme import MATRIX
+from damageest_benchmarks.readme import MATRIX
 from damageest_evaluate.report import make_legend
 from typer.main import get_command
 
@@ -91,7 +91,7 @@ REASONS = {
     "takes hours": [
         "accuracy.md: damageest evaluate",
         "adaptive.md: damageest evaluate",
-        "exact-step.md: python -m damageest_cadquery.evaluate",
+        "exact-step.md: python -m damageest_benchmarks.exact",
         "your-own-scan.md: damageest evaluate",
     ],
 }

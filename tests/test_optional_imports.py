@@ -23,7 +23,7 @@ def is_test(name: str) -> bool:
 
 
 def test_no_file_of_tests_imports_an_optional_package(sources: dict[str, str]) -> None:
-    files = [path for folder in ("tests", "plugins") for path in (ROOT / folder).rglob("test_*.py")]
+    files = [path for folder in ("tests", "plugins", "benchmarks") for path in (ROOT / folder).rglob("test_*.py")]
     files += [ROOT / "conftest.py", *ROOT.glob("tests/**/conftest.py"), *ROOT.glob("plugins/*/tests/conftest.py")]
     assert sum(is_test(name) for name in sources) == len(files) > 300
     found = [chain for name, needed in find_chains(sources).items() if is_test(name) for chain in needed.values()]

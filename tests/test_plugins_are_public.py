@@ -41,16 +41,8 @@ EXCEPTIONS = {
     "damageest_app": {"damageest.job.yamlfile", "damageest.output.folder"},
     "damageest_cadquery": {"damageest.stages.allowance.plain_stock"},
     "damageest_evaluate": {
-        "damageest.checks.model_fit",
         "damageest.checks.scan_quality",
-        "damageest.inspection.aim",
-        "damageest.inspection.compare",
-        "damageest.job.sections",
         "damageest.job.yamlfile",
-        "damageest.rules.notes",
-        "damageest.sections.measure",
-        "damageest.stages.align.register",
-        "damageest.stages.scan.deformation",
         "damageest.stages.scan.scanner",
         "damageest.stages.scan.simulate",
         "damageest.stages.scan.tools",
@@ -58,9 +50,9 @@ EXCEPTIONS = {
     "damageest_machines": {"damageest.job.yamlfile"},
 }
 """Modules that one plugin uses although they are not public: the evaluation makes its scans with the virtual scanner,
-measures single steps of a run, inspections and sections, and counts the notes that it prints; exact stock is compared
-with the stage's on the exact damage volume's own skin; the app edits the text of job files, and shows what a run wrote;
-machine files are read as job files are. The list in pyproject.toml is the same for what is forbidden there."""
+at the tolerance that a run would take; exact stock is compared with the stage's on the exact damage volume's own skin;
+the app edits the text of job files, and shows what a run wrote; machine files are read as job files are. The list in
+pyproject.toml is the same for what is forbidden there."""
 
 
 def is_public(module: str, name: str) -> bool:

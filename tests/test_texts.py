@@ -11,7 +11,13 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-SOURCES = sorted([*(ROOT / "damageest").rglob("*.py"), *ROOT.glob("plugins/*/damageest_*/**/*.py")])
+SOURCES = sorted(
+    [
+        *(ROOT / "damageest").rglob("*.py"),
+        *ROOT.glob("plugins/*/damageest_*/**/*.py"),
+        *ROOT.glob("benchmarks/damageest_*/**/*.py"),
+    ]
+)
 pytestmark = pytest.mark.slow  # all sources are parsed
 BANNED = [
     r"\b(is|are|was|were) asked\b",

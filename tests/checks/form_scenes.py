@@ -5,7 +5,7 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-from damageest_evaluate.troubles.parts import make_named_part
+from damageest_benchmarks.troubles.parts import make_named_part
 
 from damageest.artefacts import Floats, Part
 from damageest.checks.model_fit import FittedModel, measure_fit

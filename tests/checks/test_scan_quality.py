@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 
 from damageest.artefacts import Floats, Scan
 from damageest.checks.scan_quality import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 
 import damageest
 from damageest.artefacts import Part, Scan

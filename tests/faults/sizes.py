@@ -17,7 +17,7 @@ from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
-from damageest_evaluate.troubles.classify import TrueState, judge
+from damageest_benchmarks.troubles.classify import TrueState, judge
 
 import damageest
 from damageest.errors import InputError, StageError

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats

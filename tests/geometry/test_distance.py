@@ -93,7 +93,7 @@ def test_doubled_vertices_do_not_turn_the_sign() -> None:
 @pytest.mark.slow
 def test_sign_beside_the_short_edges_of_slender_triangles() -> None:
     """Round a bore with a cross hole, where long strips end on the hole's edge: the sign is that of the winding."""
-    from damageest_evaluate.parts import PARTS
+    from damageest_benchmarks.parts import PARTS
 
     part = PARTS["tube"]()
     points = np.random.default_rng(0).uniform([18, -6, 5], [24, 6, 12], (8000, 3))

@@ -6,7 +6,7 @@ from contextlib import nullcontext
 
 import numpy as np
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 
 import damageest
 from damageest.artefacts import Deviation, Sites

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from damageest_evaluate.scores import iou
 
 import damageest

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.sections.family import measure_shaft
+from damageest_benchmarks.sections.family import measure_shaft
 
 from damageest.artefacts import Floats, Part, Section
 from damageest.job.sections import SectionChoice

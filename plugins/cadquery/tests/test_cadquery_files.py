@@ -6,8 +6,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from damageest_cadquery.evaluate.files import measure_folder, read_back
-from damageest_cadquery.evaluate.files_rows import count_fair, find_faults, measure_fairly, read_rows, summarise_files
+from damageest_benchmarks.exact.files import measure_folder, read_back
+from damageest_benchmarks.exact.files_rows import count_fair, find_faults, measure_fairly, read_rows, summarise_files
 from damageest_cadquery.writing.assembly import NamedShape, write_assembly
 
 from tests.needs import import_for, needs_plugin

@@ -210,7 +210,7 @@ def test_nothing_hangs_in_the_pieces_of_a_split() -> None:
 
 def test_the_volume_of_a_twisted_blade_is_that_of_a_fine_mesh() -> None:
     """OpenCASCADE's own, with a fixed number of points, is 7 % lower."""
-    from damageest_cadquery.evaluate.parts import make_blade
+    from damageest_benchmarks.exact.parts import make_blade
     from damageest_cadquery.solids.split import measure_volume, triangulate
 
     blade = make_blade().val().wrapped
@@ -235,7 +235,7 @@ def test_a_picture_shows_faces_inside_in_red_and_others_not(tmp_path: Path) -> N
 
 
 def test_the_evaluation_counts_what_failed() -> None:
-    from damageest_cadquery.evaluate.__main__ import summarise
+    from damageest_benchmarks.exact.__main__ import summarise
 
     good = {"part": "a", "form": "shapes", "faces": 5, "seconds": 2.0, "volume": 10.01, "mesh": 10.0,
             "read_volume": 10.01, "read_valid": True, "read_solids": 1, "gmsh": [0.0, 1.0], "iou_exact": 0.95,
@@ -250,8 +250,8 @@ def test_the_evaluation_counts_what_failed() -> None:
 
 @pytest.mark.slow
 def test_a_case_of_the_evaluation_is_exact_and_read_back(tmp_path: Path) -> None:
-    from damageest_cadquery.evaluate.__main__ import run_case
-    from damageest_cadquery.evaluate.parts import make_filleted_block
+    from damageest_benchmarks.exact.__main__ import run_case
+    from damageest_benchmarks.exact.parts import make_filleted_block
 
     cq.exporters.export(make_filleted_block(), str(tmp_path / "block.step"))
     rows = run_case(tmp_path / "block.step", 14, tmp_path / "out")

@@ -1,4 +1,4 @@
-"""`damageest evaluate`: how good the results are, over many cases with known truth."""
+"""`damageest evaluate job`: which damage is found, and how well, on a part and by a scanner of the user's."""
 
 from __future__ import annotations
 
@@ -13,6 +13,6 @@ if TYPE_CHECKING:
 @hookimpl
 def damageest_commands(app: typer.Typer) -> None:
     """Adds `damageest evaluate`."""
-    from damageest_evaluate.commands import evaluate
+    from damageest_evaluate.commands import job
 
-    app.add_typer(evaluate.app, name="evaluate")
+    app.add_typer(job.app, name="evaluate")

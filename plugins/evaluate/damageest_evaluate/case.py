@@ -22,7 +22,6 @@ from damageest.stages.scan.simulate import Simulate
 from damageest_evaluate.damages import make_random_damage
 from damageest_evaluate.memory import PeakMemory
 from damageest_evaluate.meter import Meter, measure_libigl_seconds, measure_start_seconds
-from damageest_evaluate.parts import PARTS, REFINED
 from damageest_evaluate.scores import measure_depth, score
 from damageest_evaluate.sized import make_sized_damage
 
@@ -42,7 +41,7 @@ TIMES = (
 class DamageCase:
     """The inputs of one case. Equal cases give equal scans.
 
-    ``part``: name of a built-in part, or the display name of the part in ``file`` (.npz). ``first``: kind of the first
+    ``part``: the display name of the part in ``file`` (.npz). ``first``: kind of the first
     damage. ``size``: depth of the damage in the part's unit; 0: no damage; None: random. ``tools``: damage that is
     given, as in option damage of `simulate`; then nothing is random. ``scanner``: options of
     `simulate` other than damage and seed. ``job``: path of a job file, empty for the defaults; ``settings`` are applied
@@ -76,6 +75,17 @@ class DamageCase:
         row |= {"iou": 0.0, "found": 0, "missed": int(self.size != 0), "false_sites": 0, "sites": 0, "flagged": False}
         return row | {"methods": [], "failures": [], "reasons": [], "seconds": 0.0}
 
+    def load_part(self) -> Part:
+        """The part, read from the file."""
+        data = np.load(self.file)
+        return Part(
+            data["vertices"],
+            data["faces"],
+            unit=str(data["unit"]),
+            faces_brep=data.get("faces_brep"),
+            tessellation_error=float(data["error"]),
+        )
+
     def run(self) -> dict[str, Any]:
         """As `run_case`."""
         return run_case(self)
@@ -85,20 +95,6 @@ def save_part(part: Part, path: Path) -> None:
     """Writes the fields of a part that the stages use, as .npz."""
     brep: dict[str, Any] = {} if part.faces_brep is None else {"faces_brep": part.faces_brep}
     np.savez(path, vertices=part.vertices, faces=part.faces, unit=part.unit, error=part.tessellation_error, **brep)
-
-
-def load_part(case: DamageCase) -> Part:
-    """The case's part: read from its file, or the built-in one."""
-    if not case.file:
-        return (PARTS | REFINED)[case.part]()
-    data = np.load(case.file)
-    return Part(
-        data["vertices"],
-        data["faces"],
-        unit=str(data["unit"]),
-        faces_brep=data.get("faces_brep"),
-        tessellation_error=float(data["error"]),
-    )
 
 
 def simulate_scan(case: DamageCase, part: Part) -> tuple[Scan, tuple[str, ...]]:
@@ -126,7 +122,7 @@ def run_case(case: DamageCase) -> dict[str, Any]:
 def _run_measured(case: DamageCase, meter: Meter, start_seconds: float) -> dict[str, Any]:
     import damageest
 
-    part, row = load_part(case), case.make_blank_row()
+    part, row = case.load_part(), case.make_blank_row()
     try:
         scan, kinds = simulate_scan(case, part)
     except (LookupError, DamageestError) as error:

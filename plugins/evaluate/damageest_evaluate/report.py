@@ -22,7 +22,7 @@ from damageest_evaluate.figures import (
     summarise,
 )
 from damageest_evaluate.processes import Row
-from damageest_evaluate.readme import collect_versions, describe_measurement, format_markdown
+from damageest_evaluate.tables import collect_versions, describe_measurement, format_markdown
 
 COLUMNS: dict[str, tuple[str, str]] = {
     "cases": ("cases", "d"),

@@ -1,8 +1,8 @@
 from __future__ import annotations
 
 import pytest
+from damageest_benchmarks.parts import PARTS
 from damageest_evaluate.damages import KINDS, SHARE, make_random_damage
-from damageest_evaluate.parts import PARTS
 from damageest_evaluate.scores import iou, measure_depth
 
 from damageest.geometry.solids import to_manifold

@@ -24,7 +24,8 @@ from damageest_evaluate.report import (
     make_remarks,
     make_stage_cells,
 )
-from evaluate_rows import INTACT, MISSED, row
+
+from tests.evaluate_rows import INTACT, MISSED, row
 
 
 def at(size: float, found: int, missed: int, **varied: float) -> list[dict[str, object]]:

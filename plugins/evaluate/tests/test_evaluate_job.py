@@ -12,13 +12,13 @@ import pytest
 from damageest_evaluate import case as case_module
 from damageest_evaluate.job import plan_study
 from damageest_evaluate.variants import VariationRequest
-from evaluate_calls import evaluate, rows_of, timeless
 from typer.testing import CliRunner
 
 from damageest.cli import app
 from damageest.errors import DamageestError
 from damageest.registry import Registry
 from tests import damaged_box
+from tests.evaluate_calls import evaluate, rows_of, timeless
 
 SIMULATED = damaged_box.JOB.replace(
     "scan: scan.ply", "scan: {use: simulate, points: 20000, noise: 0.04, outliers: 0.01}"
@@ -115,7 +115,7 @@ def test_the_virtual_scanner_is_like_the_jobs_scan(real: Path, tmp_path: Path, r
     # depths of 0, 2, 4, 8 and 16 tolerances; the last, 3.2, within a tenth of the part
     assert [c.size for c in found.cases[:5]] == pytest.approx([0, 0.4, 0.8, 1.6, 3.2])
     assert len({c.compute_key() for c in found.cases}) == len(found.cases) == 15
-    part = case_module.load_part(case)
+    part = case.load_part()
     a, b = case_module.simulate_scan(case, part)[0], case_module.simulate_scan(case, part)[0]
     assert a.points.tobytes() == b.points.tobytes()
     assert a.truth is not None

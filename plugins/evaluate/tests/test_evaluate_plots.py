@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 from damageest_evaluate.plots import draw_plots
-from evaluate_rows import MISSED, row
+
+from tests.evaluate_rows import MISSED, row
 
 
 @pytest.mark.slow

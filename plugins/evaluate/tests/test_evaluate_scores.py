@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from damageest_evaluate.scores import iou, score
 
 from damageest.artefacts import Floats, Solid

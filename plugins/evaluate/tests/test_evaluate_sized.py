@@ -1,7 +1,7 @@
 from __future__ import annotations
 
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from damageest_evaluate.scores import measure_depth
 from damageest_evaluate.sized import DEPTH_ERROR, SIZED, make_sized_damage
 

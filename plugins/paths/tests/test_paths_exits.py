@@ -7,7 +7,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from damageest_evaluate.paths.check import measure_nozzle
+from damageest_benchmarks.paths.check import measure_nozzle
 from manifold3d import Manifold
 
 from damageest.artefacts import DepositPath, Floats, Solid

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_evaluate.paths.check import measure_nozzle
+from damageest_benchmarks.paths.check import measure_nozzle
 from damageest_paths import assemble, form_choice
 from damageest_paths.drafts import MUCH_SUNK
 from damageest_paths.form_choice import MOST_LEFT, PLANNERS, POOR, measure_lost

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_evaluate.paths.check import measure_nozzle
+from damageest_benchmarks.paths.check import measure_nozzle
 from damageest_paths.layers import Layers
 from manifold3d import Manifold
 from path_cavities import bowl, groove, stair, tip

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from damageest_evaluate.paths.check import measure_built, measure_nozzle
+from damageest_benchmarks.paths.check import measure_built, measure_nozzle
 from damageest_paths.clearance import Clearance
 from damageest_paths.exits import Travel
 from damageest_paths.moves import Moves, join_passes

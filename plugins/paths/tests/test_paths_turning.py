@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_evaluate.paths.check import measure_nozzle
+from damageest_benchmarks.paths.check import measure_nozzle
 from damageest_paths.axes import list_axes
 from damageest_paths.turning import BLOCKED, divide_turns, plan_course, turn_evenly
 from hypothesis import given, settings

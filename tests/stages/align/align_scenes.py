@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 

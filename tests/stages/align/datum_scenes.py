@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats, Ints, Part, Pose, Scan

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from damageest_evaluate.scores import measure_pose_error
 from pydantic import ValidationError
 

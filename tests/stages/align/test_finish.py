@@ -7,10 +7,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
+from damageest_benchmarks.troubles import shape, wear
+from damageest_benchmarks.troubles.scene import Scanning
 from damageest_evaluate.scores import measure_pose_error
-from damageest_evaluate.troubles import shape, wear
-from damageest_evaluate.troubles.scene import Scanning
 from pydantic import ValidationError
 from scipy.spatial.transform import Rotation
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from align_scenes import error, scene
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
+from damageest_benchmarks.troubles.case import make_scan, make_scene
+from damageest_benchmarks.troubles.suite import make_trouble_cases
 from damageest_evaluate.scores import measure_pose_error
-from damageest_evaluate.troubles.case import make_scan, make_scene
-from damageest_evaluate.troubles.suite import make_trouble_cases
 
 from damageest.artefacts import Scan
 from damageest.errors import StageError

@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 
 from damageest.artefacts import Mesh, Part
 from damageest.errors import StageError

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.differences import BALL, EARLY, LATE, DrawnPair, Pair, draw_pair
+from damageest_benchmarks.differences import BALL, EARLY, LATE, DrawnPair, Pair, draw_pair
 
 import damageest
 from damageest.artefacts import Floats

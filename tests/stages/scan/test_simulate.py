@@ -10,7 +10,7 @@ import igl
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from manifold3d import Manifold
 from pydantic import ValidationError
 

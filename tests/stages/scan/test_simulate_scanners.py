@@ -8,7 +8,7 @@ import igl
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from pydantic import ValidationError
 
 from damageest.artefacts import Floats, Mesh, Part, Scan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 
 from damageest.artefacts import ADDED, DAMAGE, INTACT, Part, Scan
 from damageest.errors import StageError

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from damageest_evaluate.parts import PARTS
+from damageest_benchmarks.parts import PARTS
 from manifold3d import Manifold
 
 import damageest

@@ -1,0 +1,31 @@
+"""`damageest evaluate sections`: diameters of shafts that are out of round."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from damageest_evaluate.commands.counted import AsJson, show_table
+
+
+def command(
+    draws: Annotated[int, typer.Option(min=1, help="Shafts, six kinds in turn.")] = 60,
+    write: Annotated[
+        Path | None, typer.Option(dir_okay=False, help="File with the marks of this table, to write it there.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Count shaft diameters within their uncertainty.
+
+    The shafts have lobes, wear on one side and grooves, seen all around or on an arc of 206 to 298 degrees.
+    """
+    from damageest_evaluate.tables import format_markdown
+
+    from damageest_benchmarks.commands._counted import write_measured
+    from damageest_benchmarks.sections.family import make_sections_table, measure_shaft
+
+    rows = [measure_shaft(seed) for seed in range(draws)]
+    table = format_markdown(make_sections_table(rows))
+    show_table(table, rows, as_json)
+    write_measured(table, "sections", write)
