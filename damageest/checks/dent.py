@@ -6,6 +6,8 @@ an edge: metal that is cut, chipped or pitted ends at one, metal that is bent fa
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from damageest.artefacts import ADDED, Floats, Ints, Part, Solid
@@ -25,6 +27,8 @@ FADES, FADES_SPACINGS = 1.5, 1.0
 """How many times wider, and by how many point spacings more, the way outward is where a loss has no edge."""
 FEWEST = 8
 """Points of a ring around the rim, at least, for their mean depth to count."""
+NEAR = 16
+"""Rings that are looked at first; four times as many each time after that."""
 WIDEST = 3.0
 """How far out rings are looked at, in widths of the loss."""
 
@@ -66,23 +70,37 @@ def _has_edge(field: ScanField, members: Ints, width: float) -> bool:
     if len(outer) < FEWEST or len(members) < FEWEST:
         return True
     ring = max(0.5 * spacing, 1e-9)
-    outward = find_neighbours(points[outer], 1, points[members])[0][:, 0]
-    inward = find_neighbours(points[members], 1, points[outer])[0][:, 0]
-    beside, within = -field.distance[outer], -field.distance[members]
-    rim = float((np.mean(beside[outward < 2 * ring]) + np.mean(within[inward < 2 * ring])) / 2)
-    out = _find_level(outward, beside, ring, SHALLOW * rim, falls=True)
-    into = _find_level(inward, within, ring, DEEP * rim, falls=False)
+    beside, within = (_Side(points[own], -field.distance[own]) for own in (outer, members))
+    rim = (beside.average_depth(within, 2 * ring) + within.average_depth(beside, 2 * ring)) / 2
+    out = beside.find_level(within, ring, SHALLOW * rim, falls=True)
+    into = within.find_level(beside, ring, DEEP * rim, falls=False)
     return out <= FADES * into + FADES_SPACINGS * spacing
 
 
-def _find_level(away: Floats, depth: Floats, ring: float, level: float, falls: bool) -> float:
-    """How far from the rim the mean depth of rings first falls below a level, or rises above it: the farthest ring
-    where it does neither, and 0 where no ring has enough points."""
-    number = (away / ring).astype(np.int64)
-    count = np.bincount(number)
-    kept = np.flatnonzero(count >= FEWEST)
-    if not len(kept):
-        return 0.0
-    mean = np.bincount(number, weights=depth)[kept] / count[kept]
-    there = kept[mean < level] if falls else kept[mean > level]
-    return float(ring * (there[0] if len(there) else kept[-1]))
+class _Side(NamedTuple):
+    """The points (N,3) on one side of a rim, and how deep (N,) each is below the skin."""
+
+    points: Floats
+    depth: Floats
+
+    def average_depth(self, other: _Side, reach: float) -> float:
+        """The mean depth of the points nearer than ``reach`` to the other side."""
+        return float(np.mean(self.depth[find_neighbours(self.points, 1, other.points, reach)[0][:, 0] < reach]))
+
+    def find_level(self, other: _Side, ring: float, level: float, falls: bool) -> float:
+        """How far from the other side the mean depth of rings first falls below a level, or rises above it: the
+        farthest ring where it does neither, and 0 where no ring has enough points."""
+        number = NEAR
+        while True:  # far points take long to look up, and few losses need them
+            away = find_neighbours(self.points, 1, other.points, number * ring)[0][:, 0]
+            near = away < number * ring
+            of_ring = (away[near] / ring).astype(np.int64)
+            count = np.bincount(of_ring)
+            kept = np.flatnonzero(count >= FEWEST)
+            mean = np.bincount(of_ring, weights=self.depth[near])[kept] / count[kept]
+            there = kept[mean < level] if falls else kept[mean > level]
+            if len(there):
+                return float(ring * there[0])
+            if near.all():
+                return float(ring * kept[-1]) if len(kept) else 0.0
+            number *= 4
