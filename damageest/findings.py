@@ -1,10 +1,12 @@
-"""What the checks find out about a result, as values: verdict, coverage, surplus, model fit, uncertainty."""
+"""What the checks find out about a result, as values: verdict, coverage, surplus, model fit, uncertainty.
+
+A text beside a type is what the schema of result.json says of the field: the models of `output/` are made of these."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,34 +31,32 @@ class Verdict:
 
 @dataclass(frozen=True, eq=False)
 class UnseenRegion:
-    """Connected skin without scan points.
-
-    ``centre`` (3,) and ``bounds`` (2,3) of its cells; ``faces``: numbers of its CAD faces, empty where the part has
-    none; ``volume``: the most that can be lost behind it without a trace in the scan. ``why``: `hidden`: the part
-    itself is between it and every scanner position; `outside`: no view reached there; `no points`: a view reached there
-    and gave no points; `unknown`: no scanner position is known; `earlier scan`: the part is one, and does not show it.
-    """
+    """Connected skin without scan points. ``centre`` (3,) and ``bounds`` (2,3) of its cells."""
 
     area: float
     centre: Floats
     bounds: Floats
-    faces: tuple[int, ...]
-    volume: float
-    why: Literal["unknown", "hidden", "outside", "no points", "earlier scan"] = "unknown"
+    faces: Annotated[tuple[int, ...], "numbers of its CAD faces; empty without B-rep"]
+    volume: Annotated[float, "volume of the part behind it: the largest loss that the scan cannot exclude"]
+    why: Annotated[
+        Literal["unknown", "hidden", "outside", "no points", "earlier scan"],
+        "hidden: by the part itself; outside: of every view; no points: though a view shows its place; "
+        "unknown: no scanner position is known; earlier scan: the part is one, which does not show it either",
+    ] = "unknown"
 
 
 @dataclass(frozen=True, eq=False)
 class Coverage:
     """What the scan shows of the part's skin.
 
-    ``seen``: its share of the skin's area. ``skin``: the skin cut into cells, triangles of similar size, F of them.
-    ``is_seen`` (F,): whether the scan has points on a cell; ``distance`` (F,): their mean signed distance, NaN where
-    there are none; ``is_lost`` (F,): whether rays of the scanner passed through the metal behind it; ``region`` (F,):
-    the cell's place in ``unseen``, -1 for a cell in none. ``unseen``: largest first.
+    ``skin``: the skin cut into cells, triangles of similar size, F of them. ``is_seen`` (F,): whether the scan has
+    points on a cell; ``distance`` (F,): their mean signed distance, NaN where there are none; ``is_lost`` (F,): whether
+    rays of the scanner passed through the metal behind it; ``region`` (F,): the cell's place in ``unseen``, -1 for a
+    cell in none.
     """
 
-    seen: float
-    unseen: tuple[UnseenRegion, ...]
+    seen: Annotated[float, "share of the skin's area that the scan shows, or shows to be lost"]
+    unseen: Annotated[tuple[UnseenRegion, ...], "connected regions without scan points, largest first"]
     skin: Mesh
     is_seen: Flags
     distance: Floats
@@ -94,31 +94,27 @@ class Surplus:
 
 @dataclass(frozen=True)
 class PatchDeviation:
-    """Mean deviations of patches of skin of width ``size``: their standard deviation ``deviation``, the share that the
-    noise of their points explains (``noise``), and the residual after removing the form of the fit (``left``)."""
+    """Mean deviations of patches of skin, by their width."""
 
-    size: float
-    deviation: float
-    noise: float
-    left: float
+    size: Annotated[float, "width of the patches of skin"]
+    deviation: Annotated[float, "standard deviation of their mean distances from the part in the pose"]
+    noise: Annotated[float, "standard deviation that the noise of their points explains"]
+    left: Annotated[float, "standard deviation after removing the form that `model` names"]
 
 
 @dataclass(frozen=True, eq=False)
 class ViewFit:
-    """How one view lies against the part: ``shift`` (3,) of the part's centre and ``turn`` in degrees that would put it
-    right, in the part's frame; ``apart``: how far it lies from the other views where they overlap; ``left``: the same
-    after the views were fitted. ``is_determined``: whether skin and overlap fix its pose, ``held``: how many of the six
-    motions they leave free, which are held. ``is_elsewhere``: whether it lies elsewhere than the others by more than
-    noise; ``is_corrected``: whether it was moved to its place."""
+    """How one view lies against the part. ``is_elsewhere``: whether it lies elsewhere than the others by more than
+    noise. ``number`` is from 0 up here."""
 
-    number: int
-    shift: Floats
-    turn: float
-    apart: float
-    left: float
-    is_determined: bool
-    is_corrected: bool
-    held: int = 0
+    number: Annotated[int, "from 1 up, in the order of the scan's views"]
+    shift: Annotated[Floats, "correction of the view: shift of the part's centre, in the part's frame"]
+    turn: Annotated[float, "correction of the view: turn in degrees"]
+    apart: Annotated[float, "distance from the other views where they overlap"]
+    left: Annotated[float, "the same distance after the correction of views with a fixed pose"]
+    is_determined: Annotated[bool, "whether its points and the overlap fix its pose"]
+    held: Annotated[int, "number of motions, of six, that they leave free; these were held"]
+    is_corrected: Annotated[bool, "whether the view was moved to its place"]
     is_elsewhere: bool = False
 
 
@@ -218,95 +214,83 @@ def describe_volume(volume: float, interval: Interval | None) -> str:
 
 @dataclass(frozen=True)
 class BudgetRow:
-    """One source of a budget of uncertainty (JCGM 100): ``source``, and ``text`` for people; ``type``: A, from the scan
-    by statistics, or B, from other knowledge. ``uncertainty``: standard uncertainty of the source, in ``unit`` ("" for
-    a share); ``sensitivity``: change of the result for each unit of it; ``contribution``: standard uncertainty of the
-    result by it; ``share`` of the variance."""
+    """A source of uncertainty, in the terms of JCGM 100 (GUM)."""
 
-    source: str
+    source: Annotated[str, "name of the source, the same from version to version"]
     text: str
-    type: Literal["A", "B"]
+    type: Annotated[Literal["A", "B"], "A: from this scan by statistics; B: from other knowledge"]
     distribution: Literal["normal", "rectangular"]
-    uncertainty: float
-    unit: str
-    sensitivity: float
-    contribution: float
-    share: float
+    uncertainty: Annotated[float, "standard uncertainty of the source, in `unit`"]
+    unit: Annotated[str, "unit of the source; empty for a share, for example a scale"]
+    sensitivity: Annotated[float, "change of the result for each unit of the source"]
+    contribution: Annotated[float, "standard uncertainty of the result by this source"]
+    share: Annotated[float, "share of the variance of the result, 0 to 1"]
 
 
 @dataclass(frozen=True)
 class BudgetBound:
-    """A bound that moves an end of the interval beyond the expanded uncertainty: ``low`` and ``high``, at most."""
+    """A bound that moves an end of the interval beyond the expanded uncertainty, at most."""
 
     source: str
     text: str
-    low: float
-    high: float
+    low: Annotated[float, "change of the low end of the interval, null: unlimited"]
+    high: Annotated[float, "change of the high end of the interval"]
 
 
 @dataclass(frozen=True)
 class Budget:
-    """A budget of uncertainty of a volume or of a depth: its ``rows``, the ``combined`` standard uncertainty, and the
-    ``expanded`` one with the coverage factor ``k``. ``correction``: of the mean error, to be added to the value.
-    ``bounds`` are no part of it: they move the ends of the 95 % interval."""
+    """A budget of uncertainty. ``bounds`` are no part of it: they move the ends of the 95 % interval."""
 
     rows: tuple[BudgetRow, ...]
-    combined: float
-    k: float
-    expanded: float
-    correction: float = 0.0
+    combined: Annotated[float, "combined standard uncertainty"]
+    k: Annotated[float, "coverage factor, of 95 %"]
+    expanded: Annotated[float, "expanded uncertainty: `k` times `combined`"]
+    correction: Annotated[float, "correction by the mean error: the middle of the interval is the value plus this"] = (
+        0.0
+    )
     bounds: tuple[BudgetBound, ...] = ()
 
 
 @dataclass(frozen=True)
 class Fading:
-    """A shallow loss whose edge fades out: its volume where it is deeper than ``half`` the tolerance, than the
-    tolerance, ``at``, and than ``twice`` the tolerance; ``beyond``: what is lost beyond the rim of the site."""
+    """Volumes of a shallow loss, counted only where it is deep enough."""
 
-    half: float
-    at: float
-    twice: float
-    beyond: float
+    half: Annotated[float, "volume deeper than half the tolerance"]
+    at: Annotated[float, "volume deeper than the tolerance"]
+    twice: Annotated[float, "volume deeper than twice the tolerance"]
+    beyond: Annotated[float, "lost beyond the rim of the site, shallower still; not part of `volume`"]
 
 
 @dataclass(frozen=True)
 class Uncertainty:
-    """How exactly a site's volume and its largest depth are known.
+    """How exactly a site's volume and its largest depth are known, and by which causes.
 
-    ``volume_95``, ``depth_95``: the 95 % intervals; None where no scan points lie on the inner surface. Causes, each as
-    one standard deviation of the volume: ``noise`` of the points; ``spacing`` of the points, between which the inner
-    surface is interpolated; ``rim``: where it meets the skin; ``pose`` as it was fitted; ``tessellation`` of the part;
-    ``form`` of skin that deviates over whole areas; ``adapt``: the adaptation of the part, extrapolated at this site by
-    ``extrapolated`` beyond intact skin, where its standard deviation is ``extrapolated_error`` at most; ``outward``:
-    skin that lies as far outside; ``views`` that differ. ``free``: change of the volume at the ends of motions that the
-    scan leaves free. ``inside``, ``beside``: by how much the loss may be larger at most where no points show the inner
-    surface, and the skin beside it. ``fading``: None for a loss that is not shallow. ``probing_form``, ``scanner``: by
-    the scanner's certificate, and by its other figures and the temperature together. ``budget``, ``depth_budget``: the
-    same as tables; None where there is no interval. ``certain``: volume of the piece that is lost also where the errors
-    are a quarter larger.
+    ``volume_95``, ``depth_95``: the 95 % intervals; None where no scan points lie on the inner surface.
+    ``extrapolated_error``: largest standard deviation of the adapted skin over ``extrapolated``. ``certain``: volume of
+    the piece that is lost also where the errors are a quarter larger.
     """
 
     volume_95: Interval | None
     depth_95: Interval | None
-    noise: float = 0.0
-    spacing: float = 0.0
-    rim: float = 0.0
-    pose: float = 0.0
-    tessellation: float = 0.0
-    form: float = 0.0
-    outward: float = 0.0
-    views: float = 0.0
-    adapt: float = 0.0
-    extrapolated: float = 0.0
+    noise: Annotated[float, "noise of the points on the inner surface"] = 0.0
+    spacing: Annotated[float, "surface between the points, above all beside the rim"] = 0.0
+    rim: Annotated[float, "line where the inner surface meets the skin"] = 0.0
+    pose: Annotated[float, "pose of the scan"] = 0.0
+    tessellation: Annotated[float, "tessellation of the CAD surface"] = 0.0
+    form: Annotated[float, "deviation of skin over whole areas"] = 0.0
+    outward: Annotated[float, "skin as far outside the part"] = 0.0
+    views: Annotated[float, "disagreement of overlapping views"] = 0.0
+    adapt: Annotated[float, "adaptation of the part; 0: not adapted"] = 0.0
+    extrapolated: Annotated[float, "length, no deviation: how far that field goes on beyond intact skin here"] = 0.0
     extrapolated_error: float = 0.0
-    free: Interval = (0.0, 0.0)
-    inside: float = 0.0
-    beside: float = 0.0
-    fading: Fading | None = None
-    probing_form: float = 0.0
-    scanner: float = 0.0
-    budget: Budget | None = None
-    depth_budget: Budget | None = None
+    free: Annotated[Interval, "least and largest change"] = (0.0, 0.0)
+    inside: Annotated[float, "inner surface without points"] = 0.0
+    beside: Annotated[float, "unseen skin beside the site"] = 0.0
+    probing_form: Annotated[float, "probing form error of the scanner's certificate, beyond the noise"] = 0.0
+    scanner: Annotated[float, "other figures of the certificate, and the temperature of the part"] = 0.0
+    budget: Annotated[Budget | None, "budget of the volume, source by source; null where nothing was measured"] = None
+    depth_budget: Annotated[Budget | None, "budget of the largest depth"] = None
+    fading: Annotated[Fading | None, "volumes of a shallow loss by counted depth; null for a sharp rim"] = None
     certain: float = 0.0
 
     @property
@@ -317,10 +301,9 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class NoiseLevel:
-    """The ``noise`` of points whose ``of`` (`incidence` in degrees, or `distance` from the scanner) lies between
-    ``low`` and ``high``."""
+    """The noise of points whose angle of incidence, or distance, lies between ``low`` and ``high``."""
 
-    of: Literal["incidence", "distance"]
+    of: Annotated[Literal["incidence", "distance"], "incidence in degrees, or distance from the scanner"]
     low: float
     high: float
     noise: float
@@ -328,11 +311,10 @@ class NoiseLevel:
 
 @dataclass(frozen=True)
 class VariogramPoint:
-    """Half the mean square by which the errors of two points differ, ``semivariance``, in the square of the job's unit,
-    where they lie ``distance`` from each other."""
+    """How much the errors of two points differ by their distance, in the square of the job's unit."""
 
-    distance: float
-    semivariance: float
+    distance: Annotated[float, "distance between two intact points, mean of a range"]
+    semivariance: Annotated[float, "half the mean square by which their errors differ"]
 
 
 @dataclass(frozen=True)
@@ -348,21 +330,14 @@ class Explained:
 
 @dataclass(frozen=True)
 class Sensor:
-    """The errors of the sensor on intact skin, in the job's unit.
+    """The errors of the sensor on intact skin, in the job's unit."""
 
-    ``noise``: standard deviation of single points; ``correlated``: of errors that neighbouring points share, over a
-    region of ``alike`` across. ``depth_step``: 0 where the depth is continuous. ``stray``: share of the points that lie
-    off the skin and belong to no site and no surplus. A loss that is shallower than ``least_depth`` or narrower than
-    ``least_width`` cannot be seen. ``levels``: noise by incidence and by distance, where scanner positions are known.
-    ``semivariogram``: how alike errors are, by the distance between the points, nearest first.
-    """
-
-    noise: float
-    correlated: float
-    alike: float
-    depth_step: float
-    stray: float
-    least_depth: float
-    least_width: float
-    levels: tuple[NoiseLevel, ...] = ()
-    semivariogram: tuple[VariogramPoint, ...] = ()
+    noise: Annotated[float, "standard deviation of single points"]
+    correlated: Annotated[float, "standard deviation of errors that neighbouring points share"]
+    alike: Annotated[float, "width of the regions that share them"]
+    depth_step: Annotated[float, "0 where the depth is continuous"]
+    stray: Annotated[float, "share of the points that lie off the skin and belong to no site and no surplus"]
+    least_depth: Annotated[float, "shallower losses cannot be seen in this scan"]
+    least_width: Annotated[float, "narrower losses cannot be seen in this scan"]
+    levels: Annotated[tuple[NoiseLevel, ...], "empty where no scanner position is known"] = ()
+    semivariogram: Annotated[tuple[VariogramPoint, ...], "semivariance of errors by distance, nearest first"] = ()

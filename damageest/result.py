@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -113,7 +113,7 @@ class StageRecord:
     stage: str
     use: str
     provider: str
-    site: int
+    site: Annotated[int, "0 for a stage that runs once per job"]
     seconds: float
     cached: bool
 
@@ -123,7 +123,7 @@ class StepRecord:
     """Time of a step between the stages, without the stages that it called."""
 
     step: str
-    seconds: float
+    seconds: Annotated[float, "without the stages that it calls"]
 
 
 @dataclass(frozen=True, eq=False)

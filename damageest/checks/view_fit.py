@@ -181,7 +181,7 @@ def fit_views(
         views.append(
             ViewFit(
                 number, beyond[3:], turn, float(known[number]), float(after[number]),
-                bool(many[number] and fit.held[number] < HELD), elsewhere and is_correcting, round(fit.held[number]),
+                bool(many[number] and fit.held[number] < HELD), round(fit.held[number]), elsewhere and is_correcting,
                 elsewhere,
             )
         )  # fmt: skip
@@ -192,7 +192,7 @@ def fit_views(
 
 def _describe_unfitted(apart: Floats) -> tuple[ViewFit, ...]:
     """Views that differ, and that show too little skin to be fitted."""
-    return tuple(ViewFit(k, np.zeros(3), 0.0, float(a), float(a), False, False, 6, False) for k, a in enumerate(apart))
+    return tuple(ViewFit(k, np.zeros(3), 0.0, float(a), float(a), False, 6, False) for k, a in enumerate(apart))
 
 
 def _hold_doubtful(fit: JointFit, apart: Floats, least: float) -> JointFit:

@@ -7,15 +7,11 @@ from typing import Literal
 from pydantic import Field
 
 from damageest.artefacts import Vector
-from damageest.findings import ModelFit
+from damageest.findings import ModelFit, PatchDeviation, ViewFit
 from damageest.output.base import JsonModel
 
 
-class PatchReport(JsonModel):
-    size: float = Field(description="width of the patches of skin")
-    deviation: float = Field(description="standard deviation of their mean distances from the part in the pose")
-    noise: float = Field(description="standard deviation that the noise of their points explains")
-    left: float = Field(description="standard deviation after removing the form that `model` names")
+class PatchReport(JsonModel, of=PatchDeviation): ...
 
 
 class ScaleReport(JsonModel):
@@ -32,15 +28,8 @@ class DeformationReport(JsonModel):
     amount: float = Field(description="largest displacement of the seen skin by it beyond the nearest rigid motion")
 
 
-class ViewReport(JsonModel):
-    number: int = Field(description="from 1 up, in the order of the scan's views")
-    shift: Vector = Field(description="correction of the view: shift of the part's centre, in the part's frame")
-    turn: float = Field(description="correction of the view: turn in degrees")
-    apart: float = Field(description="distance from the other views where they overlap")
-    left: float = Field(description="the same distance after the correction of views with a fixed pose")
-    is_determined: bool = Field(description="whether its points and the overlap fix its pose")
-    held: int = Field(description="number of motions, of six, that they leave free; these were held")
-    is_corrected: bool = Field(description="whether the view was moved to its place")
+class ViewReport(JsonModel, of=ViewFit, without=("is_elsewhere",)):
+    shift: Vector
 
 
 class FitReport(JsonModel):

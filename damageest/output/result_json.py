@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import Field
 
 from damageest.artefacts import Floats, Vector
+from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
 from damageest.output.deviation_json import DeviationReport, report_deviation
@@ -18,7 +19,7 @@ from damageest.output.section_json import SectionReport, report_section
 from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
 from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
 from damageest.output.uncertainty_json import BudgetReport, ReportedInterval
-from damageest.result import Result
+from damageest.result import Result, StageRecord, StepRecord
 from damageest.stages.export import ExportedFiles
 
 _NOTHING = ExportedFiles()
@@ -34,30 +35,14 @@ class PartReport(JsonModel):
     notes: list[str] = Field(description="repairs and conversions at reading")
 
 
-class NoiseLevelReport(JsonModel):
-    of: Literal["incidence", "distance"] = Field(description="incidence in degrees, or distance from the scanner")
-    low: float
-    high: float
-    noise: float
+class NoiseLevelReport(JsonModel, of=NoiseLevel): ...
 
 
-class VariogramReport(JsonModel):
-    distance: float = Field(description="distance between two intact points, mean of a range")
-    semivariance: float = Field(description="half the mean square by which their errors differ")
+class VariogramReport(JsonModel, of=VariogramPoint): ...
 
 
-class SensorReport(JsonModel):
+class SensorReport(JsonModel, of=Sensor):
     """The errors of the sensor, measured on intact skin."""
-
-    noise: float = Field(description="standard deviation of single points")
-    correlated: float = Field(description="standard deviation of errors that neighbouring points share")
-    alike: float = Field(description="width of the regions that share them")
-    depth_step: float = Field(description="0 where the depth is continuous")
-    stray: float = Field(description="share of the points that lie off the skin and belong to no site and no surplus")
-    least_depth: float = Field(description="shallower losses cannot be seen in this scan")
-    least_width: float = Field(description="narrower losses cannot be seen in this scan")
-    levels: list[NoiseLevelReport] = Field(description="empty where no scanner position is known")
-    semivariogram: list[VariogramReport] = Field(description="semivariance of errors by distance, nearest first")
 
 
 class ScanReport(JsonModel):
@@ -114,18 +99,10 @@ class TruthReport(JsonModel):
     transform: list[list[float]] = Field(description="the true T_part_scan")
 
 
-class StageReport(JsonModel):
-    stage: str
-    use: str
-    provider: str
-    site: int = Field(description="0 for a stage that runs once per job")
-    seconds: float
-    cached: bool
+class StageReport(JsonModel, of=StageRecord): ...
 
 
-class StepReport(JsonModel):
-    step: str
-    seconds: float = Field(description="without the stages that it calls")
+class StepReport(JsonModel, of=StepRecord): ...
 
 
 class Report(JsonModel):

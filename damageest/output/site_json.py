@@ -13,7 +13,7 @@ from damageest.output.path_json import PathReport, report_path
 from damageest.output.reason_json import ReasonReport
 from damageest.output.uncertainty_json import ReportedInterval, UncertaintyReport
 from damageest.result import Site
-from damageest.stages.export import ExportedFiles
+from damageest.stages.export import DepositForm, ExactForm, ExportedFiles, MilledForm, Spline
 
 
 class EvidenceReport(JsonModel):
@@ -45,59 +45,19 @@ class FilesReport(JsonModel):
     )
 
 
-class SplineReport(JsonModel):
-    deviation: float | None = Field(description="largest distance between surface and spline, either way")
-    trimmed: bool = Field(description="whether it ends at the surface's rim; otherwise it reaches beyond")
-    reason: str = Field(description="why there is no spline; empty where there is one")
+class SplineReport(JsonModel, of=Spline): ...
 
 
-class ExactDepositReport(JsonModel):
+class ExactDepositReport(JsonModel, of=DepositForm):
     """Whether the deposit in STEP has the CAD's own faces and their offsets."""
 
-    faces: int
-    offsets: int = Field(description="faces that are offsets of CAD faces, at the height of the stock")
-    volume: float | None
-    distance: float | None = Field(
-        description="95 % of the stock's surface, but for that within 1.5 tolerances of the damage's outline, are as "
-        "near to the mesh's, both ways, with stock as high as the mesh's"
-    )
-    farthest: float | None = Field(description="largest distance between them, both ways")
-    seconds: float = Field(description="processor time")
-    reason: str = Field(description="why it has facets; empty where it has CAD faces")
 
-
-class ExactMilledReport(JsonModel):
+class ExactMilledReport(JsonModel, of=MilledForm):
     """Whether the metal that is milled off before deposition has the CAD's own faces in STEP."""
 
-    form: str = Field(description="form of the milled surface, as that of the damage volume; none: facets")
-    faces: int
-    prepared_faces: int = Field(description="faces that milling leaves")
-    volume: float | None
-    distance: float | None = Field(description="95 % of the surface that milling leaves are as near to the mesh's")
-    farthest: float | None = Field(description="largest distance of these surfaces, both ways")
-    beyond: float | None = Field(description="share of that surface farther than a quarter of the tolerance")
-    seconds: float = Field(description="processor time")
-    tried: list[str] = Field(description="forms refused before for the opened cavity, with reasons")
-    reason: str = Field(description="why it has facets; empty where it has CAD faces")
 
-
-class ExactReport(JsonModel):
+class ExactReport(JsonModel, of=ExactForm):
     """Whether the solid in STEP has the CAD's own faces."""
-
-    form: str = Field(
-        description="form of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside "
-        "facets), facets; none: facets all over"
-    )
-    faces: int
-    inner_faces: int = Field(description="faces inside the part")
-    volume: float | None
-    distance: float | None = Field(description="95 % of the inner surface are as near to the mesh's, both ways")
-    farthest: float | None = Field(description="largest distance of the inner surfaces, both ways")
-    beyond: float | None = Field(description="share of the inner surface farther than a quarter of the tolerance")
-    seconds: float = Field(description="processor time")
-    tried: list[str] = Field(description="forms refused before, with reasons")
-    deposit: ExactDepositReport | None = Field(description="null where there is none beside the damage volume")
-    milled: ExactMilledReport | None = Field(description="null where the cavity was not opened before deposition")
 
 
 class ThicknessReport(JsonModel):

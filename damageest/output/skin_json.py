@@ -8,27 +8,18 @@ import numpy as np
 from pydantic import Field
 
 from damageest.artefacts import Vector
-from damageest.findings import Surplus
+from damageest.findings import Coverage, Surplus, UnseenRegion
 from damageest.output.base import JsonModel, strip_frame
 from damageest.result import Result
 from damageest.stages.export import ExportedFiles
 
 
-class UnseenReport(JsonModel):
-    area: float
+class UnseenReport(JsonModel, of=UnseenRegion):
     centre: Vector
     bounds: tuple[Vector, Vector]
-    faces: list[int] = Field(description="numbers of its CAD faces; empty without B-rep")
-    volume: float = Field(description="volume of the part behind it: the largest loss that the scan cannot exclude")
-    why: Literal["unknown", "hidden", "outside", "no points", "earlier scan"] = Field(
-        description="hidden: by the part itself; outside: of every view; no points: though a view shows its place; "
-        "unknown: no scanner position is known; earlier scan: the part is one, which does not show it either"
-    )
 
 
-class CoverageReport(JsonModel):
-    seen: float = Field(description="share of the skin's area that the scan shows, or shows to be lost")
-    unseen: list[UnseenReport] = Field(description="connected regions without scan points, largest first")
+class CoverageReport(JsonModel, of=Coverage, without=("skin", "is_seen", "distance", "is_lost", "region")): ...
 
 
 class SurplusReport(JsonModel):

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 
@@ -35,84 +35,66 @@ class ExportedFiles(Checked):
 
 @dataclass(frozen=True)
 class Spline:
-    """How well a spline fits an inner damage surface.
+    """How well a spline fits an inner damage surface."""
 
-    ``deviation``: the largest distance from the surface to the spline or back, None where there is no spline.
-    ``trimmed``: whether the spline ends at the rim of the surface. ``reason``: why it was not written; empty where it
-    was written.
-    """
-
-    deviation: float | None = None
-    trimmed: bool = False
-    reason: str = ""
+    deviation: Annotated[float | None, "largest distance between surface and spline, either way"] = None
+    trimmed: Annotated[bool, "whether it ends at the surface's rim; otherwise it reaches beyond"] = False
+    reason: Annotated[str, "why there is no spline; empty where there is one"] = ""
 
 
 @dataclass(frozen=True)
 class ExactForm:
-    """How a damage volume was written whose outer faces are the CAD's own.
+    """How a damage volume was written whose outer faces are the CAD's own. What lies less than a quarter of the
+    tolerance below the skin counts as near."""
 
-    ``form``: of its inner surface: ``shapes`` (planes, cylinders, spheres), ``spline``, ``planes`` (beside facets),
-    ``facets``, or ``none`` where the solid could not be made and is written with facets all over. ``faces`` and
-    ``inner_faces``: how many faces it has, and how many of them are inside the part. ``volume``. ``distance``: 95 % of
-    its inner surface are as near to the mesh's, both ways; ``farthest``: all of it; ``beyond``: the share of it that is
-    farther than a quarter of the tolerance. What lies less deep than that below the skin counts as near. ``seconds`` of
-    the processor. ``tried``: forms refused before it, with reasons. ``deposit``: how the deposit was written; None
-    where there is none beside the damage volume. ``milled``: how the metal that is milled off before deposition was
-    written; None where the cavity was not opened.
-    """
-
-    form: str
+    form: Annotated[
+        str,
+        "form of the inner surface: shapes (planes, cylinders, spheres), spline, planes (beside "
+        "facets), facets; none: facets all over",
+    ]
     faces: int = 0
-    inner_faces: int = 0
+    inner_faces: Annotated[int, "faces inside the part"] = 0
     volume: float | None = None
-    distance: float | None = None
-    farthest: float | None = None
-    beyond: float | None = None
-    seconds: float = 0.0
-    tried: tuple[str, ...] = ()
-    deposit: DepositForm | None = None
-    milled: MilledForm | None = None
+    distance: Annotated[float | None, "95 % of the inner surface are as near to the mesh's, both ways"] = None
+    farthest: Annotated[float | None, "largest distance of the inner surfaces, both ways"] = None
+    beyond: Annotated[float | None, "share of the inner surface farther than a quarter of the tolerance"] = None
+    seconds: Annotated[float, "processor time"] = 0.0
+    tried: Annotated[tuple[str, ...], "forms refused before, with reasons"] = ()
+    deposit: Annotated[DepositForm | None, "null where there is none beside the damage volume"] = None
+    milled: Annotated[MilledForm | None, "null where the cavity was not opened before deposition"] = None
 
 
 @dataclass(frozen=True)
 class MilledForm:
-    """How the metal was written that is milled off before deposition, and whose outer faces are the CAD's own.
+    """How the metal was written that is milled off before deposition, and whose outer faces are the CAD's own."""
 
-    ``form``: of the surface that milling leaves, ``none`` where the opened cavity has no exact form; ``distance``,
-    ``farthest``, ``beyond`` and ``tried``: of that surface; all as in `ExactForm`. ``faces`` of the solid, and how many
-    of them milling leaves, ``prepared_faces``. ``volume``. ``seconds`` of the processor. ``reason``: why it has facets;
-    empty where it has CAD faces.
-    """
-
-    form: str
+    form: Annotated[str, "form of the milled surface, as that of the damage volume; none: facets"]
     faces: int = 0
-    prepared_faces: int = 0
+    prepared_faces: Annotated[int, "faces that milling leaves"] = 0
     volume: float | None = None
-    distance: float | None = None
-    farthest: float | None = None
-    beyond: float | None = None
-    seconds: float = 0.0
-    tried: tuple[str, ...] = ()
-    reason: str = ""
+    distance: Annotated[float | None, "95 % of the surface that milling leaves are as near to the mesh's"] = None
+    farthest: Annotated[float | None, "largest distance of these surfaces, both ways"] = None
+    beyond: Annotated[float | None, "share of that surface farther than a quarter of the tolerance"] = None
+    seconds: Annotated[float, "processor time"] = 0.0
+    tried: Annotated[tuple[str, ...], "forms refused before for the opened cavity, with reasons"] = ()
+    reason: Annotated[str, "why it has facets; empty where it has CAD faces"] = ""
 
 
 @dataclass(frozen=True)
 class DepositForm:
-    """How a deposit was written whose stock is the offset of the part's CAD faces.
-
-    ``faces``: how many; ``offsets``: how many of them are offsets of CAD faces. ``volume``. ``distance``: 95 % of the
-    stock's surface, but for that within 1.5 tolerances of the damage's outline, are as near to the mesh's, both ways;
-    ``farthest``: all of it; both with stock as high as the mesh's. ``seconds`` of the processor. ``reason``: why it has
-    facets; empty where it has CAD faces.
-    """
+    """How a deposit was written whose stock is the offset of the part's CAD faces."""
 
     faces: int = 0
-    offsets: int = 0
+    offsets: Annotated[int, "faces that are offsets of CAD faces, at the height of the stock"] = 0
     volume: float | None = None
-    distance: float | None = None
-    farthest: float | None = None
-    seconds: float = 0.0
-    reason: str = ""
+    distance: Annotated[
+        float | None,
+        "95 % of the stock's surface, but for that within 1.5 tolerances of the damage's outline, are as "
+        "near to the mesh's, both ways, with stock as high as the mesh's",
+    ] = None
+    farthest: Annotated[float | None, "largest distance between them, both ways"] = None
+    seconds: Annotated[float, "processor time"] = 0.0
+    reason: Annotated[str, "why it has facets; empty where it has CAD faces"] = ""
 
 
 @dataclass(frozen=True, eq=False)
