@@ -54,13 +54,13 @@ def test_a_foreign_underscore_is_found() -> None:
 
 MOST_FILES = 19
 """Of one room, besides its `__init__.py`: so many are seen at once."""
+ONE_EACH = {"damageest/cli", "damageest/rules"}
+"""Rooms with one file a command, one a rule."""
 CROWDED = {
     "damageest/checks": 38,
-    "damageest/cli": 25,
     "damageest/geometry": 68,
     "damageest/io": 20,
     "damageest/pipeline": 39,
-    "damageest/rules": 28,
     "damageest/stages/report": 23,
     "plugins/app/damageest_app": 21,
     "plugins/paths/damageest_paths": 51,
@@ -70,8 +70,9 @@ CROWDED = {
 
 def test_a_room_is_seen_at_once() -> None:
     files = Counter(path.parent.relative_to(ROOT).as_posix() for path in SOURCES if path.name != "__init__.py")
-    assert {room: count for room, count in files.items() if count > CROWDED.get(room, MOST_FILES)} == {}
-    assert not [room for room in CROWDED if files[room] <= MOST_FILES], "no longer crowded: take it off the list"
+    large = {room: count for room, count in files.items() if count > MOST_FILES and room not in ONE_EACH}
+    assert {room: count for room, count in large.items() if count > CROWDED.get(room, 0)} == {}
+    assert set(CROWDED) <= set(large), "no longer crowded: take it off the list"
 
 
 def test_few_modules_lie_at_the_top() -> None:

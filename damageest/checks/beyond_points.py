@@ -54,7 +54,7 @@ class BeyondPoints:
         return self.share > CONTRADICTED
 
 
-def ask_beyond_points(solid: Solid, field: ScanField, own: Floats, unit: str) -> BeyondPoints:
+def measure_beyond_points(solid: Solid, field: ScanField, own: Floats, unit: str) -> BeyondPoints:
     """How much of a volume its scan points do not show.
 
     Args:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Part, Sites, Solid
-from damageest.checks.beyond_points import ask_beyond_points
+from damageest.checks.beyond_points import measure_beyond_points
 from damageest.findings import Surplus
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours, pick_one_per_cube
@@ -130,7 +130,7 @@ def close_surplus(surplus: Surplus, solid: Solid, field: ScanField, unit: str) -
     its points show; a note says how much.
     """
     aligned, tolerance, points = field.aligned, field.tolerance, field.points[surplus.points]
-    beyond = ask_beyond_points(solid, field, points, unit)
+    beyond = measure_beyond_points(solid, field, points, unit)
     if beyond.is_contradicted:
         return replace(surplus, notes=(*surplus.notes, f"its volume is not known: {beyond.reason}"))
     points = points[:: max(1, len(points) // 5000)]

@@ -18,34 +18,36 @@ NARROW = 0.05
 ORDER = {"contradicts": 0, "open": 1, "widens": 2, "note": 3}
 
 
-def ask_rules(rules: Iterable[Rule], site: SiteFacts, scan: ScanFacts) -> tuple[Reason, ...]:
+def apply_rules(rules: Iterable[Rule], site: SiteFacts, scan: ScanFacts) -> tuple[Reason, ...]:
     """The reasons of all rules, those first that change the verdict most. A rule of a plugin that fails makes the site
     doubtful: what it was to find is not known."""
     found = [
-        reason for rule in rules for reason in (ask_stranger(rule, site, scan) if rule.owner else rule.ask(site, scan))
+        reason
+        for rule in rules
+        for reason in (apply_foreign_rule(rule, site, scan) if rule.owner else rule.find_reasons(site, scan))
     ]
     return tuple(sorted(dict.fromkeys(found), key=lambda reason: ORDER[reason.effect]))
 
 
-def ask_all(rules: Sequence[Rule], each: Sequence[SiteFacts], scan: ScanFacts) -> list[tuple[Reason, ...]]:
+def apply_to_sites(rules: Sequence[Rule], each: Sequence[SiteFacts], scan: ScanFacts) -> list[tuple[Reason, ...]]:
     """The reasons of each site. Where others are contradicted, its rules are asked again and know of them."""
-    first = [ask_rules(rules, facts, scan) for facts in each]
+    first = [apply_rules(rules, facts, scan) for facts in each]
     is_out = [any(reason.effect == "contradicts" for reason in reasons) for reasons in first]
     number, total = sum(is_out), sum(facts.volume for facts in each)
     if number in (0, len(each)) or not total:
         return first
     share = sum(facts.volume for facts, out in zip(each, is_out, strict=True) if out) / total
     return [
-        reasons if out else ask_rules(rules, replace(facts, contradicted=number, contradicted_share=share), scan)
+        reasons if out else apply_rules(rules, replace(facts, contradicted=number, contradicted_share=share), scan)
         for facts, reasons, out in zip(each, first, is_out, strict=True)
     ]
 
 
-def ask_stranger(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
+def apply_foreign_rule(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
     """The reasons of a rule of a plugin; where it fails, or gives what is none of its own, one that says so."""
     try:
         with at_work(f"rule {rule.code}", owner=rule.owner):
-            given = rule.ask(site, scan)
+            given = rule.find_reasons(site, scan)
             found = list(given)
     except BaseException as error:
         if is_interrupt(error):

@@ -80,13 +80,13 @@ def try_one(kind: str, name: str, kept: str, registry: Registry | None = None) -
 
 def _try_rule(registry: Registry, code: str) -> list[str]:
     from damageest.artefacts import Evidence
-    from damageest.checks.verdict import ask_stranger
+    from damageest.checks.verdict import apply_foreign_rule
     from damageest.rules import RULE_FAILED, ScanFacts, SiteFacts
 
     (rule,) = [rule for rule in registry.rules if rule.code == code]
     site = SiteFacts(100.0, 40.0, 120.0, 200, 1.0, 2.0, Evidence(), (95.0, 105.0))
     scan = ScanFacts(0.2, 0.3, "mm", noise=0.03, seen_area=2000.0)
-    reasons = ask_stranger(rule, site, scan)
+    reasons = apply_foreign_rule(rule, site, scan)
     return [f"{one.text}; try: {one.remedy}" for one in reasons if one.code == RULE_FAILED]
 
 

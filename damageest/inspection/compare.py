@@ -22,7 +22,7 @@ from damageest.inspection.joined import find_bodies, keep_joined, list_joined
 from damageest.inspection.places import cut_places, land_points
 from damageest.inspection.verdicts import Verdict, WholeVerdict, judge_site, judge_whole
 from damageest.result import Result
-from damageest.rules.notes import fold_notes
+from damageest.rules.notes import merge_notes
 
 NEAR = 3.0
 """Distance from a deposit, in tolerances, within which skin does not tell how well the scan fits."""
@@ -166,7 +166,7 @@ def _choose_pose(content: Mapping[str, Any], same_setup: bool) -> tuple[Any, str
 
 def _list_notes(result: Result) -> tuple[str, ...]:
     """The notes of the run. Nobody looks for a displaced piece in a part that was built up."""
-    return tuple(str(note) for note in fold_notes(result.warnings) if note.code not in ("displaced_piece", "cluster"))
+    return tuple(str(note) for note in merge_notes(result.warnings) if note.code not in ("displaced_piece", "cluster"))
 
 
 def _measure_fit(aim: Aim, result: Result) -> float:

@@ -70,6 +70,7 @@ class _Check:
     faults: list[Fault] = field(default_factory=list)
     overridden: dict[tuple[str | int, ...], str] = field(default_factory=dict)
     """By their place, the settings that replaced a value of the job."""
+    notes: list[str] = field(default_factory=list)
 
     def add_fault(self, message: str, *path: str | int) -> None:
         self.faults.append(self.make_fault(message, *path))
@@ -129,6 +130,7 @@ class _Check:
             inspect=header.inspect,
             sections=header.sections,
             given=self.given,
+            notes=tuple(self.notes),
             make_fault=self.make_fault,
         )
 
@@ -261,9 +263,27 @@ class _Check:
             self.add_fault(str(error.args[0]), contract.stage)
             return None
 
+    def rename_options(self, item: Implementation, options: dict[str, Any]) -> dict[str, Any]:
+        """The options by the names that they have now; a note names those that the job has by a former one."""
+        key, found = item.contract.stage, dict(options)
+        for old, new in item.cls.renamed.items():
+            if old not in found:
+                continue
+            if new in found:
+                self.add_fault(f"'{old}' is the former name of '{new}': give one of them", key, old)
+            found[new] = found.pop(old)
+            self.positions = self.positions | {
+                (key, new, *place[2:]): at for place, at in self.positions.items() if place[:2] == (key, old)
+            }
+            if (key, old) in self.overridden:
+                self.overridden[key, new] = self.overridden[key, old]
+            self.notes.append(f"{key}: the option {old} is called {new} now; rename it in the job")
+        return found
+
     def check_stage(self, item: Implementation, options: dict[str, Any]) -> Stage | None:
         """The implementation with its options checked, files that it names included."""
         key = item.contract.stage
+        options = self.rename_options(item, options)
         try:
             context = {"folder": self.folder, "registry": self.registry}
             stage = item.cls.model_validate({"use": item.name, **options}, context=context)

@@ -110,8 +110,8 @@ def _make_fault(message: str, *path: str | int) -> Fault:
 @dataclass(frozen=True)
 class Job:
     """A checked job. ``stages`` holds one implementation with its options for every contract, ``given`` the artefacts
-    that a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise. ``make_fault`` makes the
-    fault of an option, with its line and column."""
+    that a Python caller handed in instead of files. ``tolerance`` None: from the scan's noise. ``notes``: options by
+    former names. ``make_fault`` makes the fault of an option, with its line and column."""
 
     name: str
     units: str
@@ -128,6 +128,7 @@ class Job:
     sections: tuple[SectionChoice, ...] = ()
     inspect: InspectChoice | None = None
     given: Mapping[Contract, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
     make_fault: Callable[..., Fault] = field(default=_make_fault, compare=False)
 
     def to_values(self, beside: Path) -> dict[str, Any]:

@@ -77,7 +77,7 @@ def adapt_part(
     samples: Samples | None = None if state.samples is None else own.call(Sample, moved).get(Sample.gives)
     if pose.doubts or pose.free:
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
-            pose = doubt_anew(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
+            pose = recheck_pose(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
     told = (*drop_settled(here.warnings, here.pose, pose), *make_notes("adapt", adapted.notes))
     told += tuple(note_datums(adapted, state.aligner, adapted.part, state.tolerance, state.unit))
     here = replace(here, part=adapted.part, aligned=aligned, pose=pose, warnings=told)
@@ -100,7 +100,7 @@ def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, AskedF
         return None, None, ()
     asked = None
     if stage.asks_first and state.refusal is None and not any(doubt.code == BY_FORM for doubt in state.pose.doubts):
-        asked, is_asked_for = ask_form(state)
+        asked, is_asked_for = find_deformation(state)
         if not is_asked_for:
             return None, asked, ()
     try:
@@ -111,7 +111,7 @@ def call_adapt(engine: Engine, state: JobState) -> tuple[JobState | None, AskedF
         return None, asked, (f"the part was not adapted: {error.message}; the result is that of the part as designed",)
 
 
-def ask_form(state: JobState) -> tuple[AskedFit, bool]:
+def find_deformation(state: JobState) -> tuple[AskedFit, bool]:
     """The fit of the model, and whether the intact skin shows a part that is not as designed by a form that it names.
     Where views lie apart, a form has to be larger than that: a field would follow the views."""
     step = max(1, len(state.aligned.points) // MEASURED)
@@ -128,7 +128,7 @@ def ask_form(state: JobState) -> tuple[AskedFit, bool]:
     return asked, bool(form > BEYOND_VIEWS * sheets.apart)
 
 
-def doubt_anew(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:
+def recheck_pose(pose: Pose, again: Pose, points: Floats, tolerance: float) -> Pose:
     """The pose of the aligned ``points`` (N,3) with the doubts and free motions that an alignment to the adapted part
     has, where that agrees. Those of the part as designed may come from its form: it fits nowhere, so it fits as well
     moved a little."""

@@ -12,10 +12,10 @@ from damageest.geometry.noise import AUTO_TOLERANCE
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.prepare import say_columns
+from damageest.pipeline.prepare import describe_columns
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.pipeline.tables import question_table
+from damageest.pipeline.tables import refit_without_table
 from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
@@ -40,7 +40,7 @@ def align_scan(engine: Engine, state: JobState) -> tuple[Scan, Part, Pose, Stage
     scan, part = state.scan, state.part
     told: Reasons = ()
     if part.unseen is not None and state.aligner is not None and state.aligner.gives_fitted_pose:
-        scan, part, pose, told = question_table(engine, state, pose)
+        scan, part, pose, told = refit_without_table(engine, state, pose)
     return scan, part, pose, refusal, (*told, *make_notes(Align.stage, pose.notes))
 
 
@@ -57,7 +57,7 @@ def _find_pose(engine: Engine, state: JobState) -> tuple[Pose, StageError | None
         pose: Pose = engine.call(Align, state).get(Align.gives)
         return _align_again(engine, state, pose), None
     except StageError as refusal:
-        refusal.message += say_columns(state.scan)
+        refusal.message += describe_columns(state.scan)
         if Adapt in engine.job.given or state.adapter is None or not state.adapter.deforms:
             raise
         coarse = state.with_named("tolerance", COARSE * state.tolerance, state.key("tolerance") + " coarse")

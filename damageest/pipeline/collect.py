@@ -66,7 +66,9 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         sites=sites,
         damage=damage,
         undamaged=subtract_from_part(part, accepted, lost),
-        warnings=rank_notes((*state.warnings, *note_unused(engine, state.samples))),
+        warnings=rank_notes(
+            (*state.warnings, *note_unused(engine, state.samples), *make_notes("renamed", engine.job.notes))
+        ),
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
         stages=tuple(engine.records),

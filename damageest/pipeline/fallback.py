@@ -52,7 +52,7 @@ def fall_back(first: Route, second: Route, compares: bool = False) -> Branch:
             again = again.with_value(JobState.warnings, (*again.warnings, _tell_missing(lacking)))
         failures = tuple(drop_tried(error) for error in again.failures if error.site not in done)
         left = tuple(number for number in left if number not in done)
-        failures += (say_used_up(state.sites, left),) if left else ()
+        failures += (report_exhausted_budget(state.sites, left),) if left else ()
         key = digest("compared" if compares else "fall_back", tried.key("found"), again.key("found"))
         return again.with_value(JobState.found, sites, key).with_value(JobState.failures, (*before, *failures), key)
 
@@ -66,7 +66,7 @@ def share_budget(sites: Sites, wanted: tuple[int, ...]) -> tuple[tuple[int, ...]
     return tuple(sorted(ordered[:BUDGET])), tuple(sorted(ordered[BUDGET:]))
 
 
-def say_used_up(sites: Sites, left: tuple[int, ...]) -> StageError:
+def report_exhausted_budget(sites: Sites, left: tuple[int, ...]) -> StageError:
     """One failure for all clusters that the second route was not tried on: their volume is not known."""
     count, points = len(left), int(np.isin(sites.label, left).sum())
     places = f"{count} more places" if count > 1 else "1 more place"

@@ -194,7 +194,7 @@ def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> Fi
     gives=("fitted", "warnings"),
     reads=("fitted", "surplus", "found", "pose", "field", "adapted", "skin", "unit", "explained", "warnings"),
 )
-def question_fit(
+def review_model_fit(
     state: JobState,
 ) -> tuple[FittedModel | None, Reasons]:
     """Withdraws the statement that the part as designed explains the intact skin, where there are doubts; limits it to

@@ -104,11 +104,11 @@ def measure_scan(scan: Scan, part: Part, aligner: Align | None) -> tuple[float, 
     wrong_size = diagnose_scale(scan.points, part.vertices, part.unit)
     known = None if aligner is None else aligner.known_pose
     if wrong_size and not (known is not None and is_piece(scan.points, part, known)):
-        raise InputError(f"scan: {wrong_size}{say_columns(scan)}", topic="unit")
+        raise InputError(f"scan: {wrong_size}{describe_columns(scan)}", topic="unit")
     return (scan.noise, scan.spacing, 0.0) if scan.noise else _measure(scan)
 
 
-def say_columns(scan: Scan) -> str:
+def describe_columns(scan: Scan) -> str:
     """The end of a message about a scan that does not fit the part: what was taken for x, y and z; empty where a file
     leaves no choice."""
     if not scan.columns:
@@ -135,7 +135,7 @@ def take_tolerance(
 
 
 @step(gives=("scan", "warnings"))
-def set_filled_aside(scan: Scan, measured_noise: float, measured_spacing: float) -> tuple[Scan, Reasons]:
+def remove_filled_points(scan: Scan, measured_noise: float, measured_spacing: float) -> tuple[Scan, Reasons]:
     """The scan with what was measured of it, without points that software put where the scanner saw nothing; how many
     these are."""
     scan = replace(scan, noise=measured_noise, spacing=measured_spacing)

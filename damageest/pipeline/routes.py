@@ -15,7 +15,7 @@ from damageest.pipeline.coverage import describe_coverage, inspect_skin
 from damageest.pipeline.deposits import make_deposits
 from damageest.pipeline.engine import Route
 from damageest.pipeline.fallback import fall_back
-from damageest.pipeline.form import correct_scale, correct_views, fit_model, question_fit
+from damageest.pipeline.form import correct_scale, correct_views, fit_model, review_model_fit
 from damageest.pipeline.grouped_enclosure import enclose_grouped
 from damageest.pipeline.large_scans import add_points_near_damage
 from damageest.pipeline.paths import plan_paths
@@ -24,14 +24,19 @@ from damageest.pipeline.prepare import (
     clean_scan,
     measure_scan,
     place_scan,
-    set_filled_aside,
+    remove_filled_points,
     settle_tolerance,
     take_tolerance,
 )
 from damageest.pipeline.scanner import correct_temperature, weigh_scanner
 from damageest.pipeline.sections import cut_sections
 from damageest.pipeline.selections import check_selections
-from damageest.pipeline.sensor import fold_hidden, look_for_sheets, measure_sensor, set_explained_aside
+from damageest.pipeline.sensor import (
+    dismiss_explained_clusters,
+    dismiss_explained_sites,
+    look_for_sheets,
+    measure_sensor,
+)
 from damageest.pipeline.sites import (
     complete_sites,
     gather_sites,
@@ -72,7 +77,7 @@ ACQUIRE: Route = (
     measure_scan,  # scan, part, aligner -> measured_noise, measured_spacing, depth_step
     take_tolerance,  # scan, part, measured_noise, measured_spacing, depth_step, asked_tolerance
     #     -> tolerance, +warnings
-    set_filled_aside,  # scan, measured_noise, measured_spacing -> scan, +warnings
+    remove_filled_points,  # scan, measured_noise, measured_spacing -> scan, +warnings
     where_taken(  # samples
         Sample,  # part, tolerance -> samples
         by=(Align, Segment, EncloseAll),
@@ -95,7 +100,7 @@ ACQUIRE: Route = (
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, field, aligned, deviation, tolerance, part, sites,
     #     samples, nearby -> surplus, deviation, +warnings
     fit_model,  # field, adapted, surplus, unit, views, corrected_scale, asked_fit -> fitted, +warnings
-    set_explained_aside,  # field, sites, sheets, views, aligner, accept -> sites, explained
+    dismiss_explained_clusters,  # field, sites, sheets, views, aligner, accept -> sites, explained
 )
 BY_SITE: Route = (
     take_clusters,  # aligned, sites, encloser, wanted -> candidates
@@ -134,9 +139,10 @@ CLOSE: Route = (
     measure_uncertainty,  # found, part, aligned, field, adapted, skin, coverage, facts, fitted, pose, pose_error,
     #     scanner_errors, tolerance, unit, adapter, warnings -> found
     judge_sites,  # found, accept, rules, facts, field, skin, coverage, pose, unit, views, aligner -> found
-    fold_hidden,  # found, sensor, explained, sheets, aligner, accept, tolerance, asked_tolerance, unit, field
-    #     -> found, folded, +warnings
-    question_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings -> fitted, warnings
+    dismiss_explained_sites,  # found, sensor, explained, sheets, aligner, accept, tolerance, asked_tolerance, unit,
+    #     field -> found, folded, +warnings
+    review_model_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings
+    #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     plan_paths,  # calls Path: found, part, tolerance -> found, +failures
     sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, scanner_errors, unit

@@ -64,7 +64,7 @@ def look_for_sheets(field: ScanField) -> Sheets:
     gives=("sites", "explained"),
     reads=("field", "sites", "sheets", "views", "aligner", "accept"),
 )
-def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
+def dismiss_explained_clusters(state: JobState) -> tuple[Sites, Explained]:
     """Takes clusters of points that views which lie apart explain for no sites: their verdict would be doubtful,
     whatever their volume is. What is deeper than the views explain stays, and what the job accepts by number."""
     field, sites, views, sheets = state.field, state.sites, state.views, state.sheets
@@ -102,7 +102,7 @@ def set_explained_aside(state: JobState) -> tuple[Sites, Explained]:
         "found", "sensor", "explained", "sheets", "aligner", "accept", "tolerance", "asked_tolerance", "unit", "field",
     ),
 )  # fmt: skip
-def fold_hidden(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
+def dismiss_explained_sites(state: JobState) -> tuple[tuple[FoundSite, ...], float, Reasons]:
     """Takes doubtful sites that errors of the sensor or a few stray points explain for what they are, and names them
     with those that views apart explain. How much they hold at most stays in the interval of the total."""
     causes = {site.number: cause for site in state.found if (cause := _explain(state, site))}

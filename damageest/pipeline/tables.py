@@ -30,7 +30,7 @@ CONTRADICTED = 0.7
 """The same share below which the scans contradict the pose."""
 
 
-def question_table(engine: Engine, state: JobState, pose: Pose) -> tuple[Scan, Part, Pose, Reasons]:
+def refit_without_table(engine: Engine, state: JobState, pose: Pose) -> tuple[Scan, Part, Pose, Reasons]:
     """Fits two scans of a part without the table that both show, where what stands on it does not agree in the pose
     with it; sets the table aside where more agrees then, and doubts the pose where both poses explain the scans."""
     scan, part, reach = state.scan, state.part, NEAR * state.tolerance

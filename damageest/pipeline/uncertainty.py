@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Flags, Ints, Solid
-from damageest.checks.beyond_points import ask_beyond_points
+from damageest.checks.beyond_points import measure_beyond_points
 from damageest.checks.budget import make_depth_budget, make_volume_budget
 from damageest.checks.coverage import find_removed_cells
 from damageest.checks.dent import find_bent_wall
@@ -146,7 +146,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         return _measure_pore(state, site)
     points = state.aligned.points[site.members]
     inner = find_inner_faces(site.damage, state.part)
-    beyond = ask_beyond_points(site.damage, state.field, points, state.unit)
+    beyond = measure_beyond_points(site.damage, state.field, points, state.unit)
     site = replace(site, beyond=beyond)
     differ = WIDTH * compare_at_site(state.field, site.members, state.skin.cells.edge)
     facts = replace(state.facts, between_views=max(state.facts.between_views, differ))

@@ -16,7 +16,7 @@ from damageest.checks.one_motion import are_sound, is_one_motion
 from damageest.checks.scan_facts import gather_scan_facts
 from damageest.checks.two_sheets import measure_two_sheets
 from damageest.checks.unseen_rim import measure_unseen_rim
-from damageest.checks.verdict import ask_all, decide, open_end
+from damageest.checks.verdict import apply_to_sites, decide, open_end
 from damageest.checks.visibility import measure_visibility
 from damageest.errors import StageError
 from damageest.findings import Level
@@ -88,7 +88,7 @@ def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
         _check_numbers("accept", accept, state.found)
     done = []
     each = _gather_all_facts(state)
-    for site, facts, reasons in zip(state.found, each, ask_all(state.rules, each, state.facts), strict=True):
+    for site, facts, reasons in zip(state.found, each, apply_to_sites(state.rules, each, state.facts), strict=True):
         interval = open_end(facts.interval, reasons)
         verdict = decide(facts.volume, interval, reasons, facts.uncertainty.certain if facts.uncertainty else 0.0)
         uncertainty = replace(site.uncertainty, volume_95=interval) if site.uncertainty else None

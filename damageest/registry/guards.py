@@ -138,7 +138,7 @@ def name_observer(hook: Any, error: BaseException) -> str:
     return package if colon else f"the observer {type(found[0].plugin).__name__}"
 
 
-def ask_joints(hook: Any, machine: str, poses: Floats, turns: Floats) -> Floats | None:
+def compute_joints(hook: Any, machine: str, poses: Floats, turns: Floats) -> Floats | None:
     """What the first plugin that knows a robot gives by the hook damageest_kinematics; None where none does.
 
     Raises StageError that names the plugin where it fails, or gives what are no joints (N,J) of the poses (N,4,4).

@@ -18,7 +18,7 @@ from damageest.artefacts import Floats
 from damageest.errors import InputError, PluginError, clean_message, describe_install, suggest
 from damageest.registry import bundled
 from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contract, contract_of
-from damageest.registry.guards import ask_joints, guard_conversion, guard_path_writer, guard_writer
+from damageest.registry.guards import compute_joints, guard_conversion, guard_path_writer, guard_writer
 from damageest.registry.loading import OWN, Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.result import Conversion
 from damageest.rules import RULE_FAILED, Rule
@@ -178,7 +178,7 @@ class Registry:
     def find_joints(self, machine: str, poses: Floats, turns: Floats) -> Floats | None:
         """The joints (N,J) of a robot at the poses (N,4,4), from the plugin that knows it; None where none does. Raises
         StageError where the plugin is at fault."""
-        return ask_joints(self.hooks.hook.damageest_kinematics, machine, poses, turns)
+        return compute_joints(self.hooks.hook.damageest_kinematics, machine, poses, turns)
 
     def missing(self) -> str:
         """A clause on plugins that are installed but broken, empty where there are none."""

@@ -7,10 +7,11 @@ nothing on points or triangles: the facts are measured before.
 
 from __future__ import annotations
 
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from damageest.artefacts import Evidence, Reason
 from damageest.findings import Interval, ModelFit, Uncertainty
@@ -130,6 +131,13 @@ class Rule(ABC):
     owner: str = ""
     """The plugin that it is from, which the registry sets; empty for those of damageest."""
 
+    def __init_subclass__(cls, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if "ask" in vars(cls) and "find_reasons" not in vars(cls):
+            text = f"{cls.__qualname__}: the method ask of a Rule is called find_reasons since 1.0; rename it"
+            warnings.warn(text, DeprecationWarning, stacklevel=2)
+            cls.find_reasons = vars(cls)["ask"]  # type: ignore[method-assign]
+
     @abstractmethod
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         """The reasons that these facts give, most often none or one."""

@@ -22,7 +22,7 @@ class AdaptedSkin(Rule):
     )
     remedy = "a larger tolerance, or a second part of its type (adapt.prior)"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if scan.adapted < MOVED * scan.tolerance or site.deepest > SHALLOW * scan.tolerance:
             return
         text = (

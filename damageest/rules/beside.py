@@ -24,7 +24,7 @@ class Beside(Rule):
     )
     remedy = "scan the skin beside the damage"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.by_rays:
             return
         skin, rim = site.evidence.skin_unseen, site.rim_unseen

@@ -20,7 +20,7 @@ class BeyondPointsRule(Rule):
     threshold = f"{ASKED:.0%} of the volume is reported; more than {CONTRADICTED:.0%} contradicts it"
     remedy = "scan this place more densely"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.by_rays or site.beyond <= ASKED * site.volume:
             return
         is_against = site.beyond > CONTRADICTED * site.volume

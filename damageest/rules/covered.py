@@ -14,7 +14,7 @@ class Covered(Rule):
     threshold = "points of the surplus within two tolerances, or 1.5 spacings, of the site's points"
     remedy = "remove the surplus (weld bead, dirt) and scan again"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number, area in site.covered:
             text = f"surplus {number} covers its skin: a loss below it cannot be seen"
             yield Reason(self.code, text, "open", area * site.deepest, f"{scan.unit}³", remedy=self.remedy)

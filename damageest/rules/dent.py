@@ -14,7 +14,7 @@ class Dent(Rule):
     threshold = "a wall up to half as thick as the loss is wide, of whose other side the scan shows less than 30 %"
     remedy = "scan the other side of the wall: a dent bulges there; a loss does not"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.bent_wall:
             text = (
                 f"it may be a dent without lost metal: it has no edge, in a wall "

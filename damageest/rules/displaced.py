@@ -14,7 +14,7 @@ class Displaced(Rule):
     threshold = "volumes within 35 %; within 10 % where the surplus touches the site"
     remedy = "put the piece back and scan again, or accept the site to repair it as if the piece were lost"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number in site.displaced:
             text = f"surplus {number} beside it is as large: a displaced piece or a bent part, without lost metal?"
             yield Reason(self.code, text, "contradicts", site.volume, f"{scan.unit}³", remedy=self.remedy)

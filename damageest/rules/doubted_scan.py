@@ -19,7 +19,7 @@ class DoubtedScan(Rule):
     threshold = f"{MANY} other sites are contradicted, which hold {SHARE:.0%} of the volume that was found"
     remedy = "look at the contradicted sites first, or accept this one by its number"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.contradicted >= MANY and site.contradicted_share >= SHARE:
             text = (
                 f"{site.contradicted} other sites, {site.contradicted_share:.0%} of the volume found, are contradicted"

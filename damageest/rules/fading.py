@@ -14,7 +14,7 @@ class FadingOut(Rule):
     threshold = "half of its skin is shallower than four tolerances"
     remedy = "choose the depth that counts: a smaller tolerance includes more"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         fading = site.uncertainty.fading if site.uncertainty else None
         if fading is None:
             return

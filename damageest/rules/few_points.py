@@ -17,7 +17,7 @@ class FewPoints(Rule):
     threshold = f"fewer than {FEW}; with fewer than {TOO_FEW}, all may be stray"
     remedy = "scan this place more densely"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.by_rays or site.count >= FEW:
             return
         text = f"only {site.count} scan points"

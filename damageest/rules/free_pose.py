@@ -20,7 +20,7 @@ class FreePoseRule(Rule):
     threshold = f"{TOLD:.0%} of the volume; from {OTHER_METAL:.0%} of other metal on the poses contradict each other"
     remedy = "name unworn faces in align.datum"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for one in site.free:
             if one.moved <= TOLD * site.volume:
                 continue

@@ -26,7 +26,7 @@ class InnerSurface(Rule):
     )
     remedy = "scan into the damage from another side"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         evidence, unit = site.evidence, scan.unit
         inside = site.uncertainty.inside if site.uncertainty else 0.0
         if site.by_rays:  # rays prove that skin is gone, and not how deep the loss reaches behind it

@@ -14,7 +14,7 @@ class IntactInside(Rule):
     threshold = "more than 10 points and 2 % of the site's points, or on more than a tenth of that skin"
     remedy = "look at the site in the report: it may join two losses, or a second sheet of points"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         evidence = site.evidence
         if not {"inside", "contradicted"} & set(evidence.causes):
             return

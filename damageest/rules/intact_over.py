@@ -25,7 +25,7 @@ class IntactOver(Rule):
     )
     remedy = "a smaller tolerance, if the noise allows it, or a denser scan"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         share = site.evidence.intact_share
         if site.by_rays or share <= UNCLEAR:
             return

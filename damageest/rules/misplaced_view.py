@@ -17,7 +17,7 @@ class MisplacedView(Rule):
     threshold = f"{AGAINST:.0%} of the site's points"
     remedy = "register the views again, by align: register or in the scanner's software, or scan more of their overlap"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.misplaced > AGAINST:
             text = (
                 f"{site.misplaced:.0%} of its points are in a misplaced view, which explains them: "

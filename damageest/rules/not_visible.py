@@ -20,7 +20,7 @@ class NotVisible(Rule):
     )
     remedy = "give the position of the scanner for each view, or scan the other side of the wall"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         hidden = site.shut + site.turned
         if hidden <= CONTRADICTED:
             return

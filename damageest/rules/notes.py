@@ -55,6 +55,7 @@ RUN_CODES: dict[str, RunCode] = {
     "sites_merged": RunCode("sites were merged, as the job says", 2),
     "cluster": RunCode("the stage cluster about its groups of points", 2),
     "section": RunCode("missing parts or values of a section", 1),
+    "renamed": RunCode("the job has an option by its former name", 2),
     "export": RunCode("a file was written differently from the job, or not at all", 1),
     "report": RunCode("the report failed; the run continued", 1),
 }
@@ -78,7 +79,7 @@ def rank_notes(notes: Iterable[Reason]) -> tuple[Reason, ...]:
     return tuple(sorted(dict.fromkeys(notes), key=lambda note: RUN_CODES.get(note.code, last).rank))
 
 
-def fold_notes(notes: Sequence[Reason]) -> tuple[Reason, ...]:
+def merge_notes(notes: Sequence[Reason]) -> tuple[Reason, ...]:
     """The notes with many of one code as one line, which gives their number and the sum of their amounts."""
     folded: list[Reason] = []
     done: set[str] = set()
@@ -119,7 +120,7 @@ def list_notes(result: Result) -> list[str]:
     """The notes on the run and on its sites, in the order in which a run prints them: those first that change a
     decision, each reason once, with the sites that have it."""
     ranks = {code: one.rank for code, one in RUN_CODES.items()}
-    notes = [(ranks.get(note.code, 2), str(note)) for note in fold_notes(result.warnings)]
+    notes = [(ranks.get(note.code, 2), str(note)) for note in merge_notes(result.warnings)]
     for level in ("doubtful", "likely", "proven"):
         chosen = [site for site in result.sites if site.verdict.level == level]
         told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]

@@ -32,7 +32,7 @@ class Nothing(Rule):
     )
     remedy = "scan this place again, or look at the part: accept the site or drop it"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.interval is None:
             yield Reason(self.code, "no scan points on its inner surface, so no interval", "widens", remedy=self.remedy)
         elif is_nothing(site.volume, site.interval, site.uncertainty.certain if site.uncertainty else 0.0):

@@ -14,7 +14,7 @@ class OffBoundary(Rule):
     threshold = "5 % of them are farther from it than 1.5 tolerances and a quarter of the spacing"
     remedy = "compare the volume with the points in the report, and try method: surface"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if "residual" not in site.evidence.causes:
             return
         off = site.evidence.ids_residual

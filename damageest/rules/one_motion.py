@@ -20,7 +20,7 @@ class OneMotion(Rule):
     )
     remedy = "register the views again, or give them as a list of files"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.one_motion:
             text = (
                 f"its {site.count} points, {site.typical:.3g} {scan.unit} deep, fit the skin after one "

@@ -15,7 +15,7 @@ class OtherMethod(Rule):
     threshold = "the other volume is outside the interval"
     remedy = "compare this site in the results of method: surface and method: implicit, or scan it more densely"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.other_volume is None or site.interval is None:
             return
         if math.isnan(site.other_volume):

@@ -19,7 +19,7 @@ class Pieces(Rule):
     threshold = f"low end at most {APRON:.0%} of the volume, and 5 % of its points {UNEVEN:g} times deeper than half"
     remedy = "a larger tolerance keeps the certain piece alone"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         certain = site.uncertainty.certain if site.uncertainty else 0.0
         if site.interval is None or is_nothing(site.volume, site.interval, certain):
             return

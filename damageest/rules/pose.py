@@ -38,7 +38,7 @@ class PoseDoubt(Rule):
     )
     remedy = "give the pose to align: none or align: icp, or pick points with align: points"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for reason in scan.pose:
             if reason.code == "other_poses" and site.other_poses <= DIFFERS:
                 continue

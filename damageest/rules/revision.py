@@ -14,7 +14,7 @@ class Revision(Rule):
     threshold = "volumes within 10 %, and extents (principal radii of gyration) within 12 %"
     remedy = "compare the scan with the drawing of the part's revision; accept the site if the loss is real"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         for number in site.twins:
             text = (
                 f"surplus {number} has the same shape: the scan may show another revision with a moved "

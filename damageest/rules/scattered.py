@@ -21,7 +21,7 @@ class Scattered(Rule):
     )
     remedy = "a larger tolerance, or accept: all where it is wear"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.shallow >= MANY and site.deepest < SHALLOW * scan.tolerance:
             text = (
                 f"one of {site.shallow} sites of its size, no deeper than {SHALLOW:g} tolerances: waves of part or "

@@ -37,7 +37,7 @@ class Terms(Rule):
     threshold = f"a half-width of {TOLD:.0%} of the volume; causes of a third of the largest one are named"
     remedy = "that of the largest cause, which the reason names"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if site.uncertainty is None or site.interval is None:
             return
         if site.interval[1] - site.interval[0] <= 2 * TOLD * site.volume:

@@ -35,7 +35,7 @@ class TwoSheets(Rule):
     )
     remedy = "register the views again, or give them as a list of files"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         share, apart = scan.sheets_share, scan.sheets_apart
         if not explains(site.two_sheets, site.typical, share, apart):
             return

@@ -25,7 +25,7 @@ class WideLoss(Rule):
     )
     remedy = "name unworn faces in align.datum, or give a known pose by align: none"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> Iterable[Reason]:
         if not scan.is_fitted or site.area <= WIDE * scan.seen_area or site.typical >= THIN * scan.tolerance:
             return
         if site.elsewhere < ELSEWHERE:

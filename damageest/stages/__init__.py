@@ -84,7 +84,8 @@ class Stage(Options):
     suffixes of its files. An implementation sets ``use``, its own name in a job, and ``isolated`` where it calls a
     native library: ``run`` then has a process of its own, and a crash, a hang or a lack of memory there is the error of
     this stage. Its class has to be in a module that can be imported. ``modules``: Python modules that ``run`` imports
-    and that may not be installed.
+    and that may not be installed. ``renamed``: former names of options, each with the one that it has now; a job may
+    still use them.
     """
 
     model_config = ConfigDict(ser_json_inf_nan="strings", defer_build=True)
@@ -94,6 +95,7 @@ class Stage(Options):
     reads: ClassVar[tuple[str, ...]] = ()
     isolated: ClassVar[bool] = False
     modules: ClassVar[tuple[str, ...]] = ()
+    renamed: ClassVar[Mapping[str, str]] = {}
 
     use: str
 

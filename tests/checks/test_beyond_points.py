@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold
 
 from damageest.artefacts import Floats, Scan
-from damageest.checks.beyond_points import BeyondPoints, ask_beyond_points
+from damageest.checks.beyond_points import BeyondPoints, measure_beyond_points
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.scan_field import ScanField
 from tests.sparse_scenes import GAP, as_part, as_solid, block, pad, pocket, scan
@@ -21,7 +21,7 @@ def ask(volume: Any, lost: Any, points: Floats | None = None) -> BeyondPoints:
     """Of a ``volume`` found, where ``lost`` is what is gone."""
     points = scan(block() - lost) if points is None else points
     own = points[distance_to_mesh(points, as_part(block())) > TOLERANCE]
-    return ask_beyond_points(as_solid(block() ^ volume), make_field(points), own, "mm")
+    return measure_beyond_points(as_solid(block() ^ volume), make_field(points), own, "mm")
 
 
 def make_field(points: Floats) -> ScanField:
@@ -67,8 +67,8 @@ def test_added_metal_is_asked_as_well() -> None:
     points = scan(block() + pad(DEPTH))
     own = points[points[:, 2] > 4 + TOLERANCE]
     field = make_field(points)
-    assert not ask_beyond_points(as_solid(pad(DEPTH)), field, own, "mm").reason
-    assert ask_beyond_points(as_solid(pad(4 * DEPTH)), field, own, "mm").is_contradicted
+    assert not measure_beyond_points(as_solid(pad(DEPTH)), field, own, "mm").reason
+    assert measure_beyond_points(as_solid(pad(4 * DEPTH)), field, own, "mm").is_contradicted
 
 
 def test_a_thin_wall_that_came_out_thick_is_told() -> None:
@@ -83,5 +83,5 @@ def test_a_thin_wall_that_came_out_thick_is_told() -> None:
 
 
 def test_without_points_of_its_own_nothing_is_said() -> None:
-    found = ask_beyond_points(as_solid(pad(1.0)), make_field(scan(block())), np.empty((0, 3)), "mm")
+    found = measure_beyond_points(as_solid(pad(1.0)), make_field(scan(block())), np.empty((0, 3)), "mm")
     assert not found.reason

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from damageest.artefacts import Evidence
-from damageest.checks.verdict import ask_rules, decide
+from damageest.checks.verdict import apply_rules, decide
 from damageest.cli._trials import try_plugins
 from damageest.registry import Registry
 from damageest.rules import ScanFacts, SiteFacts
@@ -21,7 +21,7 @@ class Age(Rule):
     meaning = "the part is old"
     threshold = "always"
 
-    def ask(self, site, scan):
+    def find_reasons(self, site, scan):
         BODY
 
 @hookimpl
@@ -46,7 +46,7 @@ FACTS = SiteFacts(100.0, 40.0, 120.0, 200, 1.0, 2.0, Evidence(), (98.0, 102.0)),
 def test_a_faulty_rule_makes_the_site_doubtful_and_is_named(site: Site, body: str, message: str) -> None:
     site.add("acme-age", RULE.replace("CODE", "'acme_age'").replace("BODY", body))
     registry = Registry.discover()
-    reasons = ask_rules(registry.rules, *FACTS)
+    reasons = apply_rules(registry.rules, *FACTS)
     level = decide(100.0, (98.0, 102.0), reasons).level
     if not message:
         assert (level, [one.code for one in reasons]) == ("proven", ["acme_age"])

@@ -173,13 +173,13 @@ from damageest.rules import Rule
 
 class Ends(Rule):
     code, meaning, threshold = "acme_ends", "ends", "always"
-    def ask(self, site, scan):
+    def find_reasons(self, site, scan):
         import os
         os.abort()
 
 class Sound(Rule):
     code, meaning, threshold = "acme_sound", "is sound", "never"
-    def ask(self, site, scan):
+    def find_reasons(self, site, scan):
         return []
 
 @hookimpl

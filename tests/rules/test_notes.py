@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from damageest.artefacts import Reason
-from damageest.rules.notes import MOST_PRINTED, RUN_CODES, cap_notes, fold_notes, join_reasons, rank_notes
+from damageest.rules.notes import MOST_PRINTED, RUN_CODES, cap_notes, join_reasons, merge_notes, rank_notes
 
 
 def test_what_changes_a_decision_comes_first_and_nothing_twice() -> None:
@@ -22,10 +22,10 @@ def test_what_changes_a_decision_comes_first_and_nothing_twice() -> None:
 def test_many_specks_are_one_line_with_their_number_and_two_stay() -> None:
     specks = [Reason("speck", f"{k} points", amount=0.1) for k in range(12)]
     other = Reason("align", "free")
-    folded = fold_notes((other, *specks))
+    folded = merge_notes((other, *specks))
     assert [note.code for note in folded] == ["align", "speck"]
     assert folded[1].amount == 12
-    assert fold_notes(specks[:2]) == tuple(specks[:2])
+    assert merge_notes(specks[:2]) == tuple(specks[:2])
 
 
 def test_a_reason_of_several_sites_is_told_once() -> None:

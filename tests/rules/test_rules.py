@@ -11,7 +11,7 @@ import pytest
 from ruamel.yaml import YAML
 
 from damageest.artefacts import Evidence, Reason
-from damageest.checks.verdict import ask_all, ask_rules, decide, open_end
+from damageest.checks.verdict import apply_rules, apply_to_sites, decide, open_end
 from damageest.findings import Fading, Uncertainty
 from damageest.registry import Registry
 from damageest.rules import FreePose, Rule, ScanFacts, SiteFacts
@@ -52,7 +52,7 @@ def make_facts(case: dict[str, Any]) -> tuple[SiteFacts, ScanFacts]:
 )
 def test_a_rule_gives_its_reason_and_no_other_rule_objects(code: str, case: dict[str, Any]) -> None:
     site, scan = make_facts(case)
-    found = tuple(RULES[code].ask(site, scan))
+    found = tuple(RULES[code].find_reasons(site, scan))
     assert [reason.effect for reason in found] == ([] if case["effect"] is None else [case["effect"]])
     for reason in found:
         assert reason.text
@@ -83,13 +83,13 @@ def test_a_small_site_is_doubted_where_nearly_all_that_was_found_is(volume: floa
         SITE, volume=200.0, interval=(196.0, 204.0), evidence=Evidence(causes=("residual",), ids_residual=0.5)
     )
     own = replace(SITE, volume=volume, interval=(0.98 * volume, 1.02 * volume))
-    *others, reasons = ask_all(list(RULES.values()), [off] * number + [own], SCAN)
+    *others, reasons = apply_to_sites(list(RULES.values()), [off] * number + [own], SCAN)
     assert decide(own.volume, own.interval, reasons).level == level
     assert [[reason.code for reason in one] for one in others] == [["off_boundary"]] * number
 
 
 def test_a_plain_site_is_proven_without_reasons() -> None:
-    reasons = ask_rules(RULES.values(), SITE, SCAN)
+    reasons = apply_rules(RULES.values(), SITE, SCAN)
     assert reasons == ()
     assert decide(VOLUME, SITE.interval, reasons).level == "proven"
 
@@ -111,14 +111,14 @@ def test_the_level_follows_from_the_interval_alone(interval: tuple[float, float]
 
 def test_words_change_no_verdict() -> None:
     site, scan = make_facts({"site": {"displaced": [1]}})
-    reasons = ask_rules(RULES.values(), site, scan)
+    reasons = apply_rules(RULES.values(), site, scan)
     reworded = tuple(replace(reason, text="", remedy="") for reason in reasons)
     assert decide(VOLUME, site.interval, reworded).level == decide(VOLUME, site.interval, reasons).level == "doubtful"
 
 
 def test_reasons_that_change_most_come_first() -> None:
     site, scan = make_facts({"site": {"displaced": [1], "count": 60, "rim_unseen": 0.1}})
-    assert [one.effect for one in ask_rules(RULES.values(), site, scan)] == ["contradicts", "open", "widens"]
+    assert [one.effect for one in apply_rules(RULES.values(), site, scan)] == ["contradicts", "open", "widens"]
 
 
 class Rust(Rule):
@@ -126,7 +126,7 @@ class Rust(Rule):
     meaning = "the site is rusty"
     threshold = "always"
 
-    def ask(self, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
+    def find_reasons(self, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
         return [Reason(self.code, "it is rusty", "contradicts")]
 
 
@@ -149,3 +149,13 @@ def test_a_plugin_adds_a_rule_and_one_that_is_none_is_refused() -> None:
     for wrong in (Rust(), int, type("Twice", (Rust,), {"code": "displaced"}), type("Mute", (Rust,), {"meaning": None})):
         with pytest.raises(PluginError):
             _read_rules(Plugin(wrong), RULES, acme)
+
+
+def test_a_rule_by_the_former_name_of_its_method_is_read() -> None:
+    def ask(self: Rule, site: SiteFacts, scan: ScanFacts) -> list[Reason]:
+        return [Reason("damp", "it is damp")]
+
+    words = {"code": "damp", "meaning": "the site is damp", "threshold": "always", "ask": ask}
+    with pytest.warns(DeprecationWarning, match="find_reasons"):
+        damp = type("Damp", (Rule,), words)
+    assert [one.code for one in damp().find_reasons(SITE, SCAN)] == ["damp"]

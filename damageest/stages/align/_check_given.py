@@ -9,7 +9,7 @@ from damageest.artefacts import Effect, Floats, Part, Reason, Scan
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
 from damageest.stages.align.handedness.mirror import MIN_GAIN as LEAST_OFF
-from damageest.stages.align.handedness.mirror import MirrorTest, ask_handedness
+from damageest.stages.align.handedness.mirror import MirrorTest, check_handedness
 from damageest.stages.align.refine.check_pose import check_pose
 from damageest.stages.align.refine.fit import Fit, fit
 from damageest.stages.align.surface.frame import Frame
@@ -83,7 +83,7 @@ def check_given(T: Floats, scan: Scan, part: Part, tolerance: float) -> tuple[Re
     is_off = given.beside > MIN_BESIDE and given.agreement < 1 - LEAST_OFF  # metal outside: no damage puts it there
     if is_off and len(oriented.points) >= LEAST_ORIENTED:
         test = MirrorTest(prepare_part(frame.target, 0), oriented, points, dense, noise, band, TRIALS)
-        doubts += ask_handedness(test, Fit(start, near.band, 0.0), given, rng).doubts
+        doubts += check_handedness(test, Fit(start, near.band, 0.0), given, rng).doubts
     if differs and gain > SMALL_GAIN:
         text = (
             f"in a pose that moves the part's surface by {moved:.3g} {part.unit}, {fitted.on:.0%} of the scan lies on "

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import AfterValidator, FiniteFloat, model_validator
@@ -54,6 +55,7 @@ class Constrained(Align):
     directions, and for inspection plans that require it.
     """
 
+    renamed: ClassVar[Mapping[str, str]] = {"about": "pivot"}
     use: Literal["constrained"] = "constrained"
     T_part_scan: RigidPose | None = Option(
         None,
@@ -62,7 +64,7 @@ class Constrained(Align):
     )
     shift: Axes = Option((), description="axes of the part's frame along which the scan may be moved: x, y, z")
     turn: Axes = Option((), description="axes of the part's frame about which it may be turned: x, y, z")
-    about: Vector | None = Option(
+    pivot: Vector | None = Option(
         None, description="point of the turns, in part coordinates, in the job's unit; default: middle of the bounds"
     )
     weights: tuple[RegionWeight, ...] = Option(
@@ -86,7 +88,7 @@ class Constrained(Align):
         """The fitted pose. Raises StageError where the scan has too few points, the fit does not converge, or the scan
         does not lie on the part in its pose."""
         Frame.build(scan, part)  # which refuses scans of too few points, or of another size
-        centre = part.bounds.mean(axis=0) if self.about is None else np.array(self.about)
+        centre = part.bounds.mean(axis=0) if self.pivot is None else np.array(self.pivot)
         some = scan.points[np.linspace(0, len(scan.points) - 1, min(MOST, len(scan.points))).astype(np.int64)]
         pose = np.eye(4) if self.T_part_scan is None else np.array(self.T_part_scan)
         basis = np.eye(6)[[AXES.index(axis) for axis in self.turn] + [3 + AXES.index(axis) for axis in self.shift]].T

@@ -48,9 +48,9 @@ class Register(Align):
         from damageest.errors import StageError
         from damageest.stages.align.datum.last_fit import FIRST, LastFit
         from damageest.stages.align.datum.system import find_datum
-        from damageest.stages.align.handedness.mirror import MIN_GAIN, MirrorTest, ask_handedness
+        from damageest.stages.align.handedness.mirror import MIN_GAIN, MirrorTest, check_handedness
         from damageest.stages.align.handedness.normals import SignedNormals, note_inward, prefer_outward
-        from damageest.stages.align.handedness.scale import ask_scale
+        from damageest.stages.align.handedness.scale import check_scale
         from damageest.stages.align.refine.fit import fit
         from damageest.stages.align.search.pairs import propose_poses
         from damageest.stages.align.search.search import search
@@ -93,13 +93,13 @@ class Register(Align):
         test = MirrorTest(
             prepared, oriented, fine, dense, noise, tolerance / frame.size, self.trials, scan.normals is not None
         )
-        scaled = ask_scale(test, finish.fit, check, rng)
+        scaled = check_scale(test, finish.fit, check, rng)
         if scaled is not None:
             if not check.is_acceptable:
                 raise scaled.build_error(check)
             doubts = (scaled.make_doubt(check),)
         elif check.agreement < 1 - MIN_GAIN:  # else no mirrored pose can be that much better
-            hand = ask_handedness(test, finish.fit, check, rng)
+            hand = check_handedness(test, finish.fit, check, rng)
             doubts = hand.doubts
             if hand.better is not None:
                 choice = Choice(hand.better.pose, hand.others, None, choice.band)

@@ -77,7 +77,7 @@ def check_deposit(
             f"there is stock on {over:.1%} of the skin around the damage that must have none, for example at ({near})"
         )
         if refuse:
-            raise StageError(text, "use targets with a smaller outer there, keep_out, or crowded: clip")
+            raise StageError(text, "use targets with a smaller outer there, keep_out, or interference: clip")
         said.append(text)
     tall = work.skin.select(work.skin.height > 0)
     if not len(tall.faces):
@@ -89,7 +89,7 @@ def check_deposit(
         near = ", ".join(f"{value:.4g}" for value in found.points[off.argmax()] + work.origin)
         text = f"the thickness of the stock is wrong on {wrong.mean():.1%} of the skin, by up to {off.max():.3g}"
         if refuse:
-            raise StageError(text, "use a larger tolerance, a smaller outer, or crowded: clip")
+            raise StageError(text, "use a larger tolerance, a smaller outer, or interference: clip")
         said.append(f"{text}, near ({near})")
     away = 10 * ON_PART * part.diagonal
     # at the border a ray along the normal may leave through the side wall; that is not the thickness

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from collections.abc import Mapping
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -35,6 +36,7 @@ class Milling(Allowance):
     places in part coordinates.
     """
 
+    renamed: ClassVar[Mapping[str, str]] = {"crowded": "interference"}
     use: Literal["milling"] = "milling"
     outer: float = Field(
         0.0, ge=0, allow_inf_nan=False,
@@ -68,7 +70,7 @@ class Milling(Allowance):
         "deposition: walls lean outward by wall_angle (degrees), undercuts go, places narrower than the radius are "
         "widened, depth is added below; default: not opened. The damage volume stays",
     )
-    crowded: Literal["refuse", "clip"] = Field(
+    interference: Literal["refuse", "clip"] = Field(
         "refuse",
         description="stock that would run into an opposite wall, close a bore or fill a gap: refuse the site, or "
         "clip (the stock ends at the wall or fills the gap; a warning names the place)",
@@ -128,8 +130,8 @@ class Milling(Allowance):
             conflict for each in skins if (conflict := find_stock_conflict(each, part, tolerance, origin)) is not None
         ]
         narrow = [found for each in conflicts if (found := each.select(~each.touches(part))) is not None]
-        if narrow and self.crowded == "refuse":
-            raise StageError(str(narrow[0]), "use targets with a smaller outer there, keep_out, or crowded: clip")
+        if narrow and self.interference == "refuse":
+            raise StageError(str(narrow[0]), "use targets with a smaller outer there, keep_out, or interference: clip")
         stock = sum((build_stock(each, tolerance / 2, has_room=not conflicts) for each in skins), Manifold())
         stock = simplify_exactly(stock, part.diagonal)
         clipped = 0.0
@@ -146,7 +148,7 @@ class Milling(Allowance):
             stock, deposit = stock + (filled - deposit), filled
         thickness, doubts = check_deposit(
             DepositGeometry(deposit, hole, stock, left, barred, skin, band, origin), part, tolerance, conflicts,
-            refuse=self.crowded == "refuse",
+            refuse=self.interference == "refuse",
         )  # fmt: skip
         milled: Solid | None = None
         if self.prepare is not None and cavity is not damage:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -23,15 +24,16 @@ class Implicit(EncloseAll):
     For damage of any shape: several losses, worn-through walls, broken-off ends. It needs no rims and no background.
     """
 
+    renamed: ClassVar[Mapping[str, str]] = {"band": "rim_width", "push": "offset"}
     use: Literal["implicit"] = "implicit"
     cell: float = Field(1.0, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
-    band: float = Field(
+    rim_width: float = Field(
         1.0,
         ge=0,
         le=10,
         description="width of skin around the damaged points that does not constrain the surface, in tolerances",
     )
-    push: float = Field(1.0, gt=0, le=4, description="outward offset of the intact skin, in tolerances")
+    offset: float = Field(1.0, gt=0, le=4, description="outward offset of the intact skin, in tolerances")
     margin: float = Field(
         8.0, ge=4, le=60, description="margin around a loss in which the surface is solved, in tolerances"
     )
@@ -60,9 +62,9 @@ class Implicit(EncloseAll):
         if not sites.count:
             return Enclosures(())
         scanned = ScanField(part, aligned, deviation, tolerance)
-        groups, skin = sort_losses(scanned, sites, nearby, self.band)
+        groups, skin = sort_losses(scanned, sites, nearby, self.rim_width)
         grids = [self._make_grid(np.concatenate([group.points, group.lost]), tolerance) for group in groups]
-        gathered = push_intact(part, groups, skin, grids, self.push * tolerance)
+        gathered = push_intact(part, groups, skin, grids, self.offset * tolerance)
         items = []
         for number, (group, grid) in enumerate(zip(groups, grids, strict=True)):
             notes: tuple[str, ...] = ()

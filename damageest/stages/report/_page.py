@@ -16,7 +16,7 @@ from damageest.errors import StageError
 from damageest.io import colours
 from damageest.io.files import embed_png, file_sha256
 from damageest.result import Result
-from damageest.rules.notes import fold_notes, qualify_nothing
+from damageest.rules.notes import merge_notes, qualify_nothing
 from damageest.stages.report import _style as style
 from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
@@ -90,7 +90,7 @@ def fill_page(
         unit=result.units,
         r=content,
         sites=sites,
-        notes=list(map(str, fold_notes(result.warnings))),
+        notes=list(map(str, merge_notes(result.warnings))),
         drawn=MOST_DRAWN,
         exaggerated=EXAGGERATED,
         heights=max((item["height"] for item in scene.objects), default=0),

@@ -19,7 +19,7 @@ from damageest.geometry.rays import RayCaster
 from damageest.geometry.views import View
 from damageest.io import colours
 from damageest.result import Result, Site
-from damageest.rules.notes import fold_notes
+from damageest.rules.notes import merge_notes
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._page import choose_tone, list_volumes
 from damageest.stages.report._pdf_book import Book, clean_line
@@ -131,7 +131,7 @@ def _summarise(book: Book, image: bytes) -> list[Any]:
     ]
     if result.sites:
         story += [head(tell("Sites")), _list_sites(book)]
-    notes = [*result.failures, *map(str, fold_notes(result.warnings))]
+    notes = [*result.failures, *map(str, merge_notes(result.warnings))]
     if notes:
         story.append(head(tell("Notes")))
         story += [write(f"– {note}", 7.5) for note in notes[:MOST_NOTES]]

@@ -10,7 +10,7 @@ from damageest.artefacts import Section
 from damageest.io.section_files import lay_out
 from damageest.stages.report._pdf_book import Book, clean_line
 from damageest.stages.report._pdf_parts import SOFT, WIDTH, Plot, grid_table, head, write
-from damageest.stages.report._sections import choose_decimals, collect_groups, tell_quantity
+from damageest.stages.report._sections import choose_decimals, collect_groups, name_quantity
 
 
 def show_sections(book: Book) -> list[Any]:
@@ -53,7 +53,7 @@ def _tabulate(book: Book, names: tuple[str, ...], sections: list[Section], decim
     rows = [["", *(f"{one.number}: {one.name}" for one in sections)]]
     rows.append([words.tell("seen"), *(words.share(one.seen) if one.contours else "–" for one in sections)])
     for k, name in enumerate(names):
-        line = [tell_quantity(name, words)]
+        line = [name_quantity(name, words)]
         for one in sections:
             value = one.values[k]
             if value.measured is None:

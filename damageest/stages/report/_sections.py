@@ -42,7 +42,7 @@ def group_sections(result: Result, words: Words) -> list[Group]:
     digits = choose_decimals(result.tolerance)
     return [
         Group(
-            tuple(tell_quantity(name, words) for name in names),
+            tuple(name_quantity(name, words) for name in names),
             tuple((one, tuple(show_value(value, digits, words) for value in one.values)) for one in sections),
         )
         for (_, names), sections in collect_groups(result).items()
@@ -62,7 +62,7 @@ def choose_decimals(tolerance: float) -> int:
     return max(2 - math.floor(math.log10(tolerance)), 0)
 
 
-def tell_quantity(name: str, words: Words) -> str:
+def name_quantity(name: str, words: Words) -> str:
     """The name of a quantity, where that of a bore has its number."""
     found = re.fullmatch(r"bore (\d+) (.+)", name)
     return f"{words.tell('bore')} {found[1]} {words.tell(found[2])}" if found else words.tell(name)

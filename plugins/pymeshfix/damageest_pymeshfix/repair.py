@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar, Literal
 
 import numpy as np
@@ -24,8 +25,9 @@ class PyMeshFix(Repair):
     """
 
     isolated: ClassVar[bool] = True
+    renamed: ClassVar[Mapping[str, str]] = {"invented": "max_new_area"}
     use: Literal["pymeshfix"] = "pymeshfix"
-    invented: float = Field(
+    max_new_area: float = Field(
         0.03,
         ge=0,
         le=1,
@@ -51,7 +53,7 @@ class PyMeshFix(Repair):
             if (
                 repaired
                 and _measure_share_off(shell, repaired, tolerance) <= MOST_LOST
-                and _measure_share_off(repaired, shell, tolerance) <= self.invented
+                and _measure_share_off(repaired, shell, tolerance) <= self.max_new_area
             ):
                 done.append(repaired)
             else:  # much of it may be missing: another piece may belong to it
@@ -65,11 +67,11 @@ class PyMeshFix(Repair):
     def _check_shape(self, solid: Solid, done: list[Solid], unclear: list[Mesh], given: Mesh, tolerance: float) -> None:
         """Raises StageError where the solid made of the repaired shells ``done`` differs from the ``given`` mesh."""
         added = _measure_share_off(solid, given, tolerance)
-        if added > self.invented:
+        if added > self.max_new_area:
             raise StageError(
                 f"{added:.1%} of the repaired mesh's area is farther than the tolerance from the enclosure: a hole is "
                 "too large to be filled",
-                f"where the filled hole is right, repair.invented: {1.1 * added:.2g}",
+                f"where the filled hole is right, repair.max_new_area: {1.1 * added:.2g}",
                 method="implicit",
             )
         for piece in unclear:

@@ -107,7 +107,7 @@ def test_a_hole_too_large_to_fill_is_refused_unless_allowed() -> None:
         repair(POINTS, FACES[HEIGHT < 2])
     assert "implicit" in caught.value.remedy
     cap = np.pi * 1**2 * (3 * 3 - 1) / 3
-    assert repair(POINTS, FACES[HEIGHT < 2], invented=1).volume == pytest.approx(BALL.volume - cap, rel=0.01)
+    assert repair(POINTS, FACES[HEIGHT < 2], max_new_area=1).volume == pytest.approx(BALL.volume - cap, rel=0.01)
 
 
 def test_a_flat_patch_is_right_where_it_is_allowed() -> None:
@@ -115,7 +115,7 @@ def test_a_flat_patch_is_right_where_it_is_allowed() -> None:
     middle = np.all([box.triangles_center[:, 2] > 1.9, *(np.abs(box.triangles_center[:, :2]) < 1).T], axis=0)
     with pytest.raises(StageError, match="too large"):
         repair(box.vertices, box.faces[~middle])
-    assert repair(box.vertices, box.faces[~middle], invented=0.1).volume == pytest.approx(64)
+    assert repair(box.vertices, box.faces[~middle], max_new_area=0.1).volume == pytest.approx(64)
 
 
 def test_a_fin_that_would_be_lost_is_refused() -> None:

@@ -70,7 +70,7 @@ def test_what_is_not_allowed_stays_and_is_told() -> None:
 def test_a_turn_about_a_point_leaves_it_in_place() -> None:
     T, at = move([0, 0, 0.02], [0, 0, 0]), np.array([20.0, 15.0, 0.0])
     T[:3, 3] = at - T[:3, :3] @ at
-    pose = fit(draw(T), turn=["z"], about=at.tolist())
+    pose = fit(draw(T), turn=["z"], pivot=at.tolist())
     assert pose.T_part_scan == pytest.approx(T, abs=NOISE / 10)
 
 

@@ -276,7 +276,7 @@ def test_faces_that_do_not_exist(part: Any, where: dict[str, Any], message: str,
         ({"keep_out": [{"box": [[0, 0, 0], [1, 1, 1]], "mesh": "a.stl"}]}, "give one of: cylinder; mesh"),
         ({"keep_out": [{"cylinder": {"from": [0, 0, 0], "to": [0, 0, 0], "radius": 1}}]}, "give two different points"),
         ({"outer": -1}, "greater than or equal to 0"),
-        ({"crowded": "maybe"}, "'refuse' or 'clip'"),
+        ({"interference": "maybe"}, "'refuse' or 'clip'"),
     ],
 )
 def test_options_that_are_wrong(chosen: dict[str, Any], message: str) -> None:

@@ -54,7 +54,7 @@ def test_a_gap_narrower_than_twice_the_stock(outer: float, fits: bool) -> None:
     message = r"no room for the stock at \((4|7), .*\): 3 is free there, but the stock is 1.6 high and 1.6 on"
     with pytest.raises(StageError, match=message):
         deposit_on(comb(3.0), GAP, targets=flanks)
-    clipped = deposit_on(comb(3.0), GAP, targets=flanks, crowded="clip")
+    clipped = deposit_on(comb(3.0), GAP, targets=flanks, interference="clip")
     assert "clipped" in clipped.notes[0]
     between = Manifold.cube((3, 6, 4)).translate((4, 4, 9))
     assert (to_manifold(clipped) ^ between).volume() == pytest.approx(between.volume(), rel=INSET)
@@ -72,7 +72,7 @@ def test_an_intact_wall_in_the_way_is_refused() -> None:
     tool = Manifold.cube((4, 6, 5)).translate((0, 4, 9))  # one tooth alone; the next one is 3 away
     with pytest.raises(StageError, match=r"3 is free there, but the stock is 3.5 high"):
         deposit_on(comb(3.0), tool, outer=3.5)
-    deposit = deposit_on(comb(3.0), tool, outer=3.5, crowded="clip")
+    deposit = deposit_on(comb(3.0), tool, outer=3.5, interference="clip")
     left = comb(3.0) - tool
     assert (to_manifold(deposit) ^ left).volume() < 1e-6
 
@@ -106,7 +106,7 @@ def test_stock_that_is_clipped_everywhere_has_the_thickness_of_the_room() -> Non
     """Both gaps beside the middle tooth are 3 wide and get filled."""
     tool = Manifold.cube((4, 6, 5)).translate((7, 4, 9))
     flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": 3.5} for k in (-1, 1)]
-    deposit = deposit_on(comb(3.0), tool, targets=flanks, crowded="clip")
+    deposit = deposit_on(comb(3.0), tool, targets=flanks, interference="clip")
     assert deposit.stock_volume == pytest.approx(2 * 3 * 6 * 4, rel=1e-3)
     assert deposit.thickness == pytest.approx((3, 3, 3), abs=1e-3)
     assert "nowhere as high as wanted: at most 3 of 3.5" in deposit.notes[1]
@@ -117,7 +117,7 @@ def test_stock_that_is_clipped_everywhere_has_the_thickness_of_the_room() -> Non
 def test_a_bore_that_stock_closes_is_filled_to_its_axis() -> None:
     tool = Manifold.cylinder(6, 8, 8, 64).translate((15, 10, 8))
     inward = {"half_space": {"point": [0, 0, 11.9], "normal": [0, 0, -1]}, "outer": 5.5}
-    deposit = deposit_on(bored(), tool, targets=[inward], crowded="clip")
+    deposit = deposit_on(bored(), tool, targets=[inward], interference="clip")
     assert deposit.stock_volume == pytest.approx(np.pi * 5**2 * 3.9, rel=0.01)
     assert deposit.thickness == pytest.approx((5.5, 5.5, 5.5), rel=0.01)
     assert "no stock on the skin" not in " ".join(deposit.notes)
@@ -126,7 +126,7 @@ def test_a_bore_that_stock_closes_is_filled_to_its_axis() -> None:
 def test_stock_between_two_damaged_walls_is_no_thicker_than_the_gap() -> None:
     flanks = [{"facing": {"direction": [k, 0, 0], "angle": 20}, "outer": 3.5} for k in (-1, 1)]
     tool = Manifold.cube((2, 6, 4)).translate((3, 4, 9)) + Manifold.cube((2, 6, 4)).translate((6, 4, 9))
-    deposit = deposit_on(comb(3.0), tool, targets=flanks, crowded="clip")
+    deposit = deposit_on(comb(3.0), tool, targets=flanks, interference="clip")
     assert deposit.thickness is not None
     assert deposit.thickness[2] == pytest.approx(3, abs=1e-3)
 
@@ -151,7 +151,7 @@ def test_what_is_clipped_is_told_with_place_and_volume() -> None:
     tool = Manifold.cube((2, 6, 4)).translate((2, 4, 9))
     with pytest.raises(StageError, match="no room for the stock"):
         deposit_on(comb(3.0), tool, targets=flank)
-    clipped = deposit_on(comb(3.0), tool, targets=flank, crowded="clip")
+    clipped = deposit_on(comb(3.0), tool, targets=flank, interference="clip")
     assert re.search(r"no room for the stock at \(4, .*; clipped there: [0-9.]+ of stock in volume", clipped.notes[0])
     told = float(re.search(r"clipped there: ([0-9.]+)", clipped.notes[0])[1])  # type: ignore[index]
     assert told == pytest.approx(6 * 4 * 1, rel=0.05)
@@ -164,5 +164,5 @@ def test_clip_does_not_refuse_what_it_cannot_clip() -> None:
     tool = make_damage(body, rng)
     with pytest.raises(StageError, match="skin around the damage that must have none"):
         deposit_on(body, tool, outer=1.9305666644142077, overlap=1.5)
-    clipped = deposit_on(body, tool, outer=1.9305666644142077, overlap=1.5, crowded="clip")
+    clipped = deposit_on(body, tool, outer=1.9305666644142077, overlap=1.5, interference="clip")
     assert any("that must have none, for example at (11, " in note for note in clipped.notes)

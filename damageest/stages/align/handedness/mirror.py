@@ -105,7 +105,7 @@ class Handedness:
     doubts: tuple[Reason, ...] = ()
 
 
-def ask_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> Handedness:
+def check_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> Handedness:
     """Compares the scan in its pose ``best`` with its mirror image, which is fitted no harder than the scan itself.
 
     Of a part that a plane mirrors onto itself there is nothing to ask. Raises StageError where the scan shows enough of

@@ -61,7 +61,7 @@ class OtherScale:
 REMEDY = "check units, the scanner's calibration and the revision of the CAD; export the scan again in the right size"
 
 
-def ask_scale(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> OtherScale | None:
+def check_scale(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.random.Generator) -> OtherScale | None:
     """The scale in which the scan explains the part far better than in its pose ``best``; None where there is none.
 
     A scan that is damaged lies off the part where metal is lost, one of another size nearly everywhere.
