@@ -8,7 +8,7 @@ from damageest_benchmarks.families.case import FAMILIES, FamilyCase
 from damageest_benchmarks.families.report import describe_row, make_family_cases, make_family_table
 from damageest_benchmarks.families.scene import Draw
 
-from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.transforms import move_points
 
 
@@ -71,6 +71,24 @@ def test_datums_lie_on_the_scan_as_it_is(seed: int) -> None:
         assert placed[:, 2].max() < draw.part.bounds[1, 2] - draw.tolerance
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [1, 6])
+def test_a_part_on_a_table_lies_on_its_earlier_scan_where_nothing_is_lost(seed: int) -> None:
+    draw = FAMILIES["surroundings"][1](seed)
+    assert draw.pose is not None
+    assert draw.damage is not None
+    placed = move_points(draw.scan.points, draw.pose)
+    middle = draw.damage.bounds.mean(axis=0)
+    radius = (3 * draw.damage.volume / np.pi) ** (1 / 3)
+    gap = np.linalg.norm(placed - middle, axis=1)
+    assert gap.min() > 0.25 * radius
+    off, face, _ = closest_on_mesh(placed[(gap > 1.5 * radius) & (gap < 3 * radius)], draw.part)
+    assert draw.part.unseen is not None
+    off = off[~draw.part.unseen[face]]
+    assert len(off) > 200
+    assert np.quantile(off, 0.9) < draw.tolerance
+
+
 def test_equal_seeds_give_equal_scans() -> None:
     first, second = FAMILIES["hands"][1](3), FAMILIES["hands"][1](3)
     assert np.array_equal(first.scan.points, second.scan.points)
@@ -79,8 +97,8 @@ def test_equal_seeds_give_equal_scans() -> None:
 
 def test_cases_are_drawn_evenly_and_counted_by_group() -> None:
     cases = make_family_cases((), 10, (), "source")
-    assert len(cases) == 46
-    assert len({case.compute_key() for case in cases}) == 46
+    assert len(cases) == 50
+    assert len({case.compute_key() for case in cases}) == 50
     rows = [case.make_blank_row() | {"said": {"side": "both"}} for case in cases if case.family == "walls"]
     rows[0] |= {"outcome": "right", "comes_out": True, "holds": True, "accepted": 1, "sites": 1}
     table = make_family_table(rows)

@@ -10,7 +10,9 @@ from damageest_evaluate.commands.counted import AsJson
 
 
 def command(
-    families: Annotated[list[str] | None, typer.Argument(help="walls, hands, turned, datums. Default: all.")] = None,
+    families: Annotated[
+        list[str] | None, typer.Argument(help="walls, hands, turned, datums, surroundings. Default: all.")
+    ] = None,
     every: Annotated[int, typer.Option(min=1, help="Take one draw of so many.")] = 1,
     seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds of the draws, instead of --every.")] = "",
     workers: Annotated[int, typer.Option(min=1, help="Draws that run at the same time.")] = 1,
@@ -21,10 +23,12 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Count right results on random draws of families. Families: walls (300), hands (60), turned (60), datums (40).
+    """Count right results on random draws of families. Families: walls (300), hands (60), turned (60), datums (40),
+    surroundings (40).
 
     walls: a pit in a wall of 0.6 to 8 mm, scanned from outside, inside or both. hands: the part or its mirror image.
     turned: round parts whose angle one small feature fixes. datums: parts held by sound or worn datums.
+    surroundings: two scans of a part on a table, where it was laid down another way.
     """
     from damageest_evaluate.commands.counted import run_counted, show_table
     from damageest_evaluate.job import fingerprint_code

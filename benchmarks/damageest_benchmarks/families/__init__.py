@@ -1,1 +1,1 @@
-"""Families of scans drawn at random: thin walls, mirrored parts, round parts. Ray casting tells what was seen."""
+"""Families of scans drawn at random: thin walls, hands, round parts, datums, tables. Rays tell what was seen."""

@@ -16,6 +16,7 @@ from damageest.result import Result
 from damageest_benchmarks.families.datums import draw_datums
 from damageest_benchmarks.families.hands import draw_hand
 from damageest_benchmarks.families.scene import Draw
+from damageest_benchmarks.families.surroundings import draw_surroundings
 from damageest_benchmarks.families.turned import draw_turned
 from damageest_benchmarks.families.walls import draw_wall
 from damageest_benchmarks.troubles.case import describe_judgement
@@ -23,6 +24,7 @@ from damageest_benchmarks.troubles.classify import TrueState, judge, judge_error
 
 FAMILIES: Mapping[str, tuple[int, Callable[[int], Draw]]] = {
     "walls": (300, draw_wall), "hands": (60, draw_hand), "turned": (60, draw_turned), "datums": (40, draw_datums),
+    "surroundings": (40, draw_surroundings),
 }  # fmt: skip
 """How many draws each family has, and what makes one from its seed."""
 NARROW = 0.25

@@ -14,6 +14,7 @@ GROUPS: Mapping[str, tuple[str, ...]] = {
     "hands": ("hand", "body"),
     "turned": ("body", "feature"),
     "datums": ("state", "form"),
+    "surroundings": ("way", "around"),
 }
 """What the draws of a family are grouped by."""
 
