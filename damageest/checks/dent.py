@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import ADDED, Floats, Ints, Part, Solid
-from damageest.checks.coverage import SkinView, find_removed_cells
+from damageest.checks.skin.coverage import SkinView, find_removed_cells
 from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.geometry.rays import measure_thickness
 from damageest.geometry.scan_field import ScanField

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.checks.coverage import SkinView
-from damageest.checks.pose_error import make_rows
+from damageest.checks.interval.pose_error import make_rows
+from damageest.checks.skin.coverage import SkinView
 from damageest.geometry.scan_field import ScanField
 
 DAMPING = 1e-6

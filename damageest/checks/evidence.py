@@ -18,7 +18,7 @@ from damageest.artefacts import (
     Part,
     Solid,
 )
-from damageest.checks.unseen_rim import face_alike
+from damageest.checks.skin.unseen_rim import face_alike
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh
 from damageest.geometry.neighbourhoods import find_in_box, pick_one_per_cube
 from damageest.geometry.point_pieces import number_pieces

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from damageest.artefacts import ADDED, Pose
-from damageest.checks.coverage import SkinView
 from damageest.checks.scan_facts import FEWEST_OUTSIDE
+from damageest.checks.skin.coverage import SkinView
 from damageest.findings import Surplus, Verdict
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import measure_area

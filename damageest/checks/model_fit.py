@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats, Part
-from damageest.checks.form_choice import FormChoice, choose_form
-from damageest.checks.form_fields import Field
-from damageest.checks.form_fit import Form
-from damageest.checks.form_words import describe_fit
-from damageest.checks.view_fit import ViewFits
+from damageest.checks.form.form_choice import FormChoice, choose_form
+from damageest.checks.form.form_fields import Field
+from damageest.checks.form.form_fit import Form
+from damageest.checks.form.form_words import describe_fit
+from damageest.checks.views.view_fit import ViewFits
 from damageest.findings import Deformed, ModelFit, PatchDeviation
 from damageest.geometry.patches import Patches
 from damageest.geometry.transforms import remove_rigid

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 
 from damageest.artefacts import ADDED, Pose
-from damageest.checks.coverage import SkinView
-from damageest.checks.skin_cells import AVERAGED
-from damageest.checks.two_sheets import Sheets
-from damageest.checks.view_overlap import compare_views
+from damageest.checks.skin.coverage import SkinView
+from damageest.checks.skin.skin_cells import AVERAGED
+from damageest.checks.views.two_sheets import Sheets
+from damageest.checks.views.view_overlap import compare_views
 from damageest.findings import Surplus
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import measure_area

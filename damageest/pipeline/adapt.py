@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples
 from damageest.checks.model_fit import AskedFit, measure_fit
-from damageest.checks.two_sheets import measure_sheets
+from damageest.checks.views.two_sheets import measure_sheets
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
-from damageest.checks.budget import UNKNOWN
+from damageest.checks.interval.budget import UNKNOWN
 from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import extract_ids

@@ -11,11 +11,11 @@ import numpy as np
 
 from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Pose, Reason, Scan
 from damageest.checks.fit_doubts import find_fit_doubts
-from damageest.checks.form_words import describe_fit, describe_view_of
+from damageest.checks.form.form_words import describe_fit, describe_view_of
 from damageest.checks.model_fit import AskedFit, FittedModel, measure_fit
 from damageest.checks.scan_quality import choose_tolerance
-from damageest.checks.view_fit import ViewFits, fit_views
-from damageest.checks.view_split import separate_views
+from damageest.checks.views.view_fit import ViewFits, fit_views
+from damageest.checks.views.view_split import separate_views
 from damageest.errors import StageError
 from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance

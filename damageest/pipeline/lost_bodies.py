@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Evidence, Part, Solid
-from damageest.checks.coverage import SkinView
+from damageest.checks.skin.coverage import SkinView
 from damageest.geometry.bodies import label_pieces
 from damageest.pipeline.state import FoundSite
 

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Reason, Scan
+from damageest.checks.interval.pose_error import PoseError
+from damageest.checks.interval.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
+from damageest.checks.interval.site_error import WIDTH
 from damageest.checks.model_fit import FittedModel
-from damageest.checks.pose_error import PoseError
-from damageest.checks.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
-from damageest.checks.site_error import WIDTH
 from damageest.geometry.scan_field import ScanField
 from damageest.job.scanner import Certificate, ScannerInfo, Temperature
 from damageest.pipeline.form import divide_scan

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Mesh, Reason, Section
-from damageest.checks.pose_error import PoseError
+from damageest.checks.interval.pose_error import PoseError
 from damageest.findings import Sensor
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import DAMAGE, OUTLIER, Ints, Pose, Reason, Sites
-from damageest.checks.pose_error import PoseError, measure_pose_error
-from damageest.checks.semivariogram import measure_semivariogram
-from damageest.checks.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
-from damageest.checks.two_sheets import Sheets, measure_sheets, measure_two_sheets
+from damageest.checks.interval.pose_error import PoseError, measure_pose_error
+from damageest.checks.interval.semivariogram import measure_semivariogram
+from damageest.checks.interval.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
+from damageest.checks.views.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
 from damageest.geometry.scan_field import ScanField
 from damageest.job.model import Accept

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from damageest.artefacts import Part, Reason, Scan
-from damageest.checks.shared_skin import find_unshared
+from damageest.checks.skin.shared_skin import find_unshared
 from damageest.errors import StageError
 from damageest.pipeline.state import Reasons
 

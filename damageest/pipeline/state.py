@@ -35,14 +35,14 @@ from damageest.artefacts import (
     Surface,
 )
 from damageest.checks.beyond_points import BeyondPoints
-from damageest.checks.coverage import SkinView
-from damageest.checks.free_pose import Dependence
+from damageest.checks.interval.free_pose import Dependence
+from damageest.checks.interval.pose_error import PoseError
+from damageest.checks.interval.scanner import ScannerErrors
+from damageest.checks.interval.site_error import SiteError
 from damageest.checks.model_fit import AskedFit, FittedModel
-from damageest.checks.pose_error import PoseError
-from damageest.checks.scanner import ScannerErrors
-from damageest.checks.site_error import SiteError
-from damageest.checks.two_sheets import Sheets
-from damageest.checks.view_fit import ViewFits
+from damageest.checks.skin.coverage import SkinView
+from damageest.checks.views.two_sheets import Sheets
+from damageest.checks.views.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.geometry.lost_depth import measure_lost_depth

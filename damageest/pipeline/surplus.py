@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Sites
 from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
-from damageest.checks.two_sheets import FARTHEST
+from damageest.checks.views.two_sheets import FARTHEST
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
 from damageest.geometry.alike import have_same_shape

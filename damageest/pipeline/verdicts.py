@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Reason
-from damageest.checks.coverage import SkinView, find_removed_cells
 from damageest.checks.elsewhere import measure_elsewhere
 from damageest.checks.evidence import weigh_evidence
-from damageest.checks.free_pose import compare_other_poses, describe_motion
-from damageest.checks.one_motion import are_sound, is_one_motion
+from damageest.checks.interval.free_pose import compare_other_poses, describe_motion
 from damageest.checks.scan_facts import gather_scan_facts
-from damageest.checks.two_sheets import measure_two_sheets
-from damageest.checks.unseen_rim import measure_unseen_rim
+from damageest.checks.skin.coverage import SkinView, find_removed_cells
+from damageest.checks.skin.unseen_rim import measure_unseen_rim
+from damageest.checks.skin.visibility import measure_visibility
 from damageest.checks.verdict import apply_to_sites, decide, open_end
-from damageest.checks.visibility import measure_visibility
+from damageest.checks.views.one_motion import are_sound, is_one_motion
+from damageest.checks.views.two_sheets import measure_two_sheets
 from damageest.errors import StageError
 from damageest.findings import Level
 from damageest.geometry.scan_field import ScanField

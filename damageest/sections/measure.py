@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.artefacts.sections import Section, SectionContour, SectionValue
-from damageest.checks.pose_error import PoseError
+from damageest.checks.interval.pose_error import PoseError
 from damageest.job.sections import SectionChoice
 from damageest.sections.blade import is_blade, measure_blade
 from damageest.sections.blade_values import measure_as_blade

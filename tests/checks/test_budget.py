@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from damageest.checks.budget import SOURCES, make_depth_budget, make_volume_budget
-from damageest.checks.scanner import ScannerErrors, Term, leave_form, spread_of
-from damageest.checks.site_error import WIDTH, SiteError, combine_total
+from damageest.checks.interval.budget import SOURCES, make_depth_budget, make_volume_budget
+from damageest.checks.interval.scanner import ScannerErrors, Term, leave_form, spread_of
+from damageest.checks.interval.site_error import WIDTH, SiteError, combine_total
 from damageest.findings import Budget
 from tests.needs import import_or_skip
 

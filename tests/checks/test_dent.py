@@ -7,9 +7,9 @@ import pytest
 import trimesh
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Scan, Solid
-from damageest.checks.coverage import SkinView
 from damageest.checks.dent import find_bent_wall
-from damageest.checks.skin_cells import cut_skin, find_seen
+from damageest.checks.skin.coverage import SkinView
+from damageest.checks.skin.skin_cells import cut_skin, find_seen
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.scan_field import ScanField
 from tests.stages.enclose.test_side import RADIUS, TOLERANCE, plate, scan_top

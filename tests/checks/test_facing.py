@@ -9,7 +9,7 @@ import pytest
 from manifold3d import Manifold
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Flags, Floats, Part, Scan
-from damageest.checks.facing import find_turned
+from damageest.checks.skin.facing import find_turned
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_arrays

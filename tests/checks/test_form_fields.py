@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from damageest.checks.form_fields import BENDS, EVERY, SCALE, STRETCHES, TWISTS, choose_frame
+from damageest.checks.form.form_fields import BENDS, EVERY, SCALE, STRETCHES, TWISTS, choose_frame
 from damageest.geometry.transforms import remove_rigid
 from tests.checks.form_scenes import draw_skin, get_part
 from tests.geometry.shapes import draw_pose

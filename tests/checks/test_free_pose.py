@@ -8,7 +8,12 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import FreeMotion, Part, Pose, Solid
-from damageest.checks.free_pose import compare_other_poses, describe_motion, measure_dependence, measure_hidden_wear
+from damageest.checks.interval.free_pose import (
+    compare_other_poses,
+    describe_motion,
+    measure_dependence,
+    measure_hidden_wear,
+)
 
 LENGTH, WIDTH, HEIGHT, DEPTH = 40.0, 30.0, 20.0, 0.5
 

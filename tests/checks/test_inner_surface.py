@@ -9,7 +9,7 @@ import pytest
 import trimesh
 
 from damageest.artefacts import Flags, Floats, Solid
-from damageest.checks.inner_surface import InnerSurface, measure_inner_surface
+from damageest.checks.interval.inner_surface import InnerSurface, measure_inner_surface
 
 SIDE, DEPTH = 10.0, 5.0
 

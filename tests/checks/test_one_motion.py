@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Part, Scan
-from damageest.checks.one_motion import are_sound, is_one_motion
+from damageest.checks.views.one_motion import are_sound, is_one_motion
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
 from damageest.stages.scan.simulate import Simulate

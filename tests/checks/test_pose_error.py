@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from damageest.artefacts import INTACT, Deviation, Floats, Part, Scan
-from damageest.checks.pose_error import PoseError, measure_pose_error
+from damageest.checks.interval.pose_error import PoseError, measure_pose_error
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces

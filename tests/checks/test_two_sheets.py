@@ -7,7 +7,7 @@ import pytest
 
 import damageest
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Floats, Scan
-from damageest.checks.two_sheets import measure_sheets, measure_two_sheets
+from damageest.checks.views.two_sheets import measure_sheets, measure_two_sheets
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
 from damageest.rules.two_sheets import AGAINST, OF_SCAN

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from damageest.checks.site_error import WIDTH, SiteError, combine_site, combine_total, measure_certain
+from damageest.checks.interval.site_error import WIDTH, SiteError, combine_site, combine_total, measure_certain
 
 SIZES = st.floats(0.0, 10.0)
 ERRORS = st.builds(

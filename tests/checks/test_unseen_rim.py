@@ -10,8 +10,8 @@ import trimesh
 
 import damageest
 from damageest.artefacts import Mesh, Part, Scan, Solid
-from damageest.checks.uncertainty import limit_beside
-from damageest.checks.unseen_rim import find_unseen_beside, measure_unseen_rim
+from damageest.checks.interval.uncertainty import limit_beside
+from damageest.checks.skin.unseen_rim import find_unseen_beside, measure_unseen_rim
 from damageest.findings import Coverage, UnseenRegion
 from damageest.stages.scan.simulate import Simulate
 from tests import damaged_box

@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 
 import damageest
 from damageest.artefacts import Scan
-from damageest.checks.view_fit import fit_views
+from damageest.checks.views.view_fit import fit_views
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.stages.scan.simulate import Simulate
 from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 import damageest
 from damageest.artefacts import Floats, Scan
-from damageest.checks.view_fit import fit_views
-from damageest.checks.view_split import separate_views
+from damageest.checks.views.view_fit import fit_views
+from damageest.checks.views.view_split import separate_views
 from damageest.geometry.distance import distance_to_mesh
 from damageest.stages.scan.simulate import Simulate
 from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part

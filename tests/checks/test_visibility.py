@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan, Solid
-from damageest.checks.visibility import Visibility, measure_visibility
+from damageest.checks.skin.visibility import Visibility, measure_visibility
 from damageest.geometry.distance import closest_on_mesh, signed_distance
 from damageest.geometry.scan_field import ScanField
 from tests.stages.enclose.test_side import RADIUS, TOLERANCE, plate, scan_top

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Solid
-from damageest.checks.site_error import SiteError, combine_total
+from damageest.checks.interval.site_error import SiteError, combine_total
 from damageest.stages.adapt._basis import Basis
 from damageest.stages.adapt._body import spread_evenly
 from damageest.stages.adapt._choose import Score, Trial

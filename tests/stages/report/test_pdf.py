@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import damageest
-from damageest.checks import budget
+from damageest.checks.interval import budget
 from damageest.errors import JobError
 from damageest.job import load
 from damageest.registry import Registry

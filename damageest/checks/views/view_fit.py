@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 
 from damageest.artefacts import Floats, Ints, Part, Scan
-from damageest.checks.form_fields import FieldFrame, choose_frame
-from damageest.checks.form_fit import Skin, make_motion
-from damageest.checks.view_joint import JointFit, ViewPoints, fit_jointly
+from damageest.checks.form.form_fields import FieldFrame, choose_frame
+from damageest.checks.form.form_fit import Skin, make_motion
+from damageest.checks.views.view_joint import JointFit, ViewPoints, fit_jointly
 from damageest.findings import ViewFit
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.neighbourhoods import pick_one_per_cube

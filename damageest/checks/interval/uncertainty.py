@@ -10,11 +10,11 @@ import numpy as np
 
 from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, FreeMotion, Part, Solid
 from damageest.checks.beyond_points import BeyondPoints
-from damageest.checks.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface
-from damageest.checks.pose_error import PoseError
-from damageest.checks.scanner import ScannerErrors, find_shares
-from damageest.checks.site_error import WIDTH, SiteError
-from damageest.checks.unseen_rim import find_unseen_beside
+from damageest.checks.interval.inner_surface import DEPTH_GAP, DEPTH_NOISE, measure_inner_surface
+from damageest.checks.interval.pose_error import PoseError
+from damageest.checks.interval.scanner import ScannerErrors, find_shares
+from damageest.checks.interval.site_error import WIDTH, SiteError
+from damageest.checks.skin.unseen_rim import find_unseen_beside
 from damageest.findings import Coverage
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh, distance_to_mesh

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part
-from damageest.checks.skin_cells import SkinCells
+from damageest.checks.skin.skin_cells import SkinCells
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.rays import Crossings, RayCaster, prepare_rays

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import ADDED
-from damageest.checks.site_error import WIDTH
+from damageest.checks.interval.site_error import WIDTH
 from damageest.geometry.neighbourhoods import measure_local_areas
 from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField

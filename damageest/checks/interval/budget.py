@@ -14,8 +14,8 @@ from typing import Literal
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.checks.scanner import ScannerErrors
-from damageest.checks.site_error import WIDTH, SiteError
+from damageest.checks.interval.scanner import ScannerErrors
+from damageest.checks.interval.site_error import WIDTH, SiteError
 from damageest.findings import Budget, BudgetBound, BudgetRow
 
 Distribution = Literal["normal", "rectangular"]

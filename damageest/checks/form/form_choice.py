@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Part
-from damageest.checks.form_fields import BENDS, EVERY, LEANS, SCALE, SHEARS, STRETCHES, TWISTS, Field, choose_frame
-from damageest.checks.form_fit import (
+from damageest.checks.form.form_fields import BENDS, EVERY, LEANS, SCALE, SHEARS, STRETCHES, TWISTS, Field, choose_frame
+from damageest.checks.form.form_fit import (
     Cells,
     Feet,
     Form,

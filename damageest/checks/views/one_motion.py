@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part
-from damageest.checks.two_sheets import LEAST_NOISE
+from damageest.checks.views.two_sheets import LEAST_NOISE
 from damageest.geometry.neighbourhoods import find_neighbours
 from damageest.geometry.scan_field import ScanField
 

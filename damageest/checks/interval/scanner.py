@@ -14,7 +14,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Solid
-from damageest.checks.pose_error import PoseError
+from damageest.checks.interval.pose_error import PoseError
 
 REFERENCE = 20.0
 """Temperature in °C at which the dimensions of a drawing hold (ISO 1)."""

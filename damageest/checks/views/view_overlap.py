@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import INTACT, Floats, Ints
-from damageest.checks.view_fit import number_views
+from damageest.checks.views.view_fit import number_views
 from damageest.geometry.neighbourhoods import find_in_box
 from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 
 from damageest.artefacts import INTACT, Floats, Scan
-from damageest.checks.pose_error import PoseError
+from damageest.checks.interval.pose_error import PoseError
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.geometry.noise import find_least_depth
 from damageest.geometry.patches import Patches

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest.checks.form_fields import FieldFrame
-from damageest.checks.form_fit import FEWEST, LARGEST, Skin, make_motion, weigh
+from damageest.checks.form.form_fields import FieldFrame
+from damageest.checks.form.form_fit import FEWEST, LARGEST, Skin, make_motion, weigh
 from damageest.geometry.patches import Patches
 from damageest.geometry.voxels import number_cubes
 

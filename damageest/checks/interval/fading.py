@@ -12,8 +12,8 @@ from collections.abc import Callable
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Solid
-from damageest.checks.coverage import SkinView, find_removed_cells
-from damageest.checks.skin_cells import AVERAGED
+from damageest.checks.skin.coverage import SkinView, find_removed_cells
+from damageest.checks.skin.skin_cells import AVERAGED
 from damageest.findings import Fading
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
-from damageest.checks.form_fields import FieldFrame
-from damageest.checks.form_fit import Skin, weigh
-from damageest.checks.two_sheets import LEAST_NOISE, find_sheets
-from damageest.checks.view_fit import (
+from damageest.checks.form.form_fields import FieldFrame
+from damageest.checks.form.form_fit import Skin, weigh
+from damageest.checks.views.two_sheets import LEAST_NOISE, find_sheets
+from damageest.checks.views.view_fit import (
     APART,
     BY_NOISE,
     COMPARED,
@@ -21,7 +21,7 @@ from damageest.checks.view_fit import (
     FoundBy,
     number_views,
 )
-from damageest.checks.view_joint import PER_CELL, PER_PATCH, deal_patches
+from damageest.checks.views.view_joint import PER_CELL, PER_PATCH, deal_patches
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField

@@ -9,8 +9,8 @@ from typing import Literal
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Solid
-from damageest.checks.ray_evidence import RayEvidence
-from damageest.checks.skin_cells import MOST_CELLS, SkinCells
+from damageest.checks.skin.ray_evidence import RayEvidence
+from damageest.checks.skin.skin_cells import MOST_CELLS, SkinCells
 from damageest.findings import Coverage, UnseenRegion
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
-from damageest.checks.form_fields import Field, FieldFrame
+from damageest.checks.form.form_fields import Field, FieldFrame
 from damageest.geometry.distance import SurfaceTree, keep_tree
 from damageest.geometry.patches import Patches
 from damageest.geometry.transforms import make_motions, move_points
