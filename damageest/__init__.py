@@ -10,8 +10,8 @@ if TYPE_CHECKING:
     from damageest.api import run as run
     from damageest.batches.run import batch as batch
     from damageest.job import Job as Job
-    from damageest.pipeline.prepare import read_inputs as read_inputs
-    from damageest.pipeline.prepare import read_part as read_part
+    from damageest.pipeline.placing.prepare import read_inputs as read_inputs
+    from damageest.pipeline.placing.prepare import read_part as read_part
     from damageest.pipeline.watch import MemoryCache as MemoryCache
     from damageest.pipeline.watch import Progress as Progress
     from damageest.registry import Registry as Registry
@@ -23,8 +23,8 @@ _PUBLIC = {
     "run": "damageest.api",
     "hookimpl": "damageest.registry.hookspecs",
     "Job": "damageest.job",
-    "read_inputs": "damageest.pipeline.prepare",
-    "read_part": "damageest.pipeline.prepare",
+    "read_inputs": "damageest.pipeline.placing.prepare",
+    "read_part": "damageest.pipeline.placing.prepare",
     "MemoryCache": "damageest.pipeline.watch",
     "Progress": "damageest.pipeline.watch",
     "Registry": "damageest.registry",

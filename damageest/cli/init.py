@@ -41,7 +41,7 @@ def command(
     from damageest.errors import Fault, JobError
     from damageest.io.files import moved_into_place
     from damageest.job import load
-    from damageest.pipeline.prepare import inspect_inputs, keep_inputs
+    from damageest.pipeline.placing.prepare import inspect_inputs, keep_inputs
     from damageest.registry import Registry
 
     target = job or Path(f"{part.stem}.yaml")

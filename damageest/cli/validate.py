@@ -44,7 +44,7 @@ def _check(jobs: list[Path], settings: list[str], as_json: bool) -> int:
             job = load(path, registry, settings)
             check_target(job.output)
             if any(stage.find_selectors() for stage in job.stages.values()):  # it is the engine that reads the part
-                from damageest.pipeline.selections import check_with_part
+                from damageest.pipeline.placing.selections import check_with_part
 
                 check_with_part(job, registry)
         except JobError as error:

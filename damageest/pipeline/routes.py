@@ -8,18 +8,35 @@ test compares these lines with the code.
 
 from __future__ import annotations
 
-from damageest.pipeline.adapt import adapt_part
-from damageest.pipeline.alignment import align_scan
-from damageest.pipeline.collect import collect_result
-from damageest.pipeline.coverage import describe_coverage, inspect_skin
-from damageest.pipeline.deposits import make_deposits
 from damageest.pipeline.engine import Route
-from damageest.pipeline.fallback import fall_back
-from damageest.pipeline.form import correct_scale, correct_views, fit_model, review_model_fit
-from damageest.pipeline.grouped_enclosure import enclose_grouped
-from damageest.pipeline.large_scans import add_points_near_damage
-from damageest.pipeline.paths import plan_paths
-from damageest.pipeline.prepare import (
+from damageest.pipeline.finding.coverage import describe_coverage, inspect_skin
+from damageest.pipeline.finding.fallback import fall_back
+from damageest.pipeline.finding.grouped_enclosure import enclose_grouped
+from damageest.pipeline.finding.sites import (
+    complete_sites,
+    gather_sites,
+    take_clusters,
+    take_enclosures,
+    where_damaged,
+)
+from damageest.pipeline.finding.surplus import find_surplus, relate_surplus
+from damageest.pipeline.judging.collect import collect_result
+from damageest.pipeline.judging.deposits import make_deposits
+from damageest.pipeline.judging.paths import plan_paths
+from damageest.pipeline.judging.sections import cut_sections
+from damageest.pipeline.judging.sensor import (
+    dismiss_explained_clusters,
+    dismiss_explained_sites,
+    look_for_sheets,
+    measure_sensor,
+)
+from damageest.pipeline.judging.uncertainty import measure_uncertainty, sum_uncertainty
+from damageest.pipeline.judging.verdicts import choose_sites, gather_facts, judge_sites
+from damageest.pipeline.placing.adapt import adapt_part
+from damageest.pipeline.placing.alignment import align_scan
+from damageest.pipeline.placing.form import correct_scale, correct_views, fit_model, review_model_fit
+from damageest.pipeline.placing.large_scans import add_points_near_damage
+from damageest.pipeline.placing.prepare import (
     check_clusters,
     clean_scan,
     measure_scan,
@@ -28,26 +45,9 @@ from damageest.pipeline.prepare import (
     settle_tolerance,
     take_tolerance,
 )
-from damageest.pipeline.scanner import correct_temperature, weigh_scanner
-from damageest.pipeline.sections import cut_sections
-from damageest.pipeline.selections import check_selections
-from damageest.pipeline.sensor import (
-    dismiss_explained_clusters,
-    dismiss_explained_sites,
-    look_for_sheets,
-    measure_sensor,
-)
-from damageest.pipeline.sites import (
-    complete_sites,
-    gather_sites,
-    take_clusters,
-    take_enclosures,
-    where_damaged,
-)
-from damageest.pipeline.skin_points import sample_near_damage, where_taken
-from damageest.pipeline.surplus import find_surplus, relate_surplus
-from damageest.pipeline.uncertainty import measure_uncertainty, sum_uncertainty
-from damageest.pipeline.verdicts import choose_sites, gather_facts, judge_sites
+from damageest.pipeline.placing.scanner import correct_temperature, weigh_scanner
+from damageest.pipeline.placing.selections import check_selections
+from damageest.pipeline.placing.skin_points import sample_near_damage, where_taken
 from damageest.pipeline.writing import (
     describe_output,
     show_result,

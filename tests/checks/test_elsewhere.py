@@ -9,7 +9,7 @@ from damageest.artefacts import DAMAGE, INTACT, Deviation, Scan
 from damageest.checks.elsewhere import measure_elsewhere
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
-from damageest.pipeline.coverage import inspect_skin
+from damageest.pipeline.finding.coverage import inspect_skin
 from damageest.stages.scan.simulate import Simulate
 from tests.damaged_box import SIZE, box
 

@@ -8,7 +8,7 @@ import pytest
 
 from damageest.errors import JobError
 from damageest.io.files import check_output_file, moved_into_place
-from damageest.pipeline import prepare
+from damageest.pipeline.placing import prepare
 from tests import damaged_box
 from tests.cli.calls import call
 

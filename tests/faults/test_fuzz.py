@@ -11,7 +11,7 @@ import pytest
 
 from damageest.job import load
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.prepare import place_scan
+from damageest.pipeline.placing.prepare import place_scan
 from damageest.pipeline.routes import route_of
 from damageest.registry import Registry
 from tests.faults import others, seeds

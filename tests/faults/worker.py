@@ -40,7 +40,7 @@ def try_job(path: Path, mode: str, registry: Any) -> dict[str, Any]:
     from damageest.isolation import Limits
     from damageest.job import load
     from damageest.pipeline.engine import Engine, follow, start
-    from damageest.pipeline.prepare import crop_scan
+    from damageest.pipeline.placing.prepare import crop_scan
     from damageest.stages.part import ReadPart
     from damageest.stages.scan import ReadScan
     from tests.faults import others

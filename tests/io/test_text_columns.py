@@ -11,7 +11,7 @@ from damageest.artefacts import Part, Scan
 from damageest.errors import InputError
 from damageest.io.points import FormatError, text
 from damageest.io.points.text_columns import name_columns
-from damageest.pipeline.prepare import choose_columns, measure_scan
+from damageest.pipeline.placing.prepare import choose_columns, measure_scan
 from damageest.stages.scan.file import ScanFile
 from tests.geometry.shapes import box
 from tests.io.test_text_as_others_write_it import write

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from damageest.errors import InputError, JobError
 from damageest.job import load, yamlfile
-from damageest.pipeline.prepare import inspect_inputs, read_inputs
+from damageest.pipeline.placing.prepare import inspect_inputs, read_inputs
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.stages.cluster import Cluster

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import FreeMotion, Pose, Reason
-from damageest.pipeline.adapt import recheck_pose
+from damageest.pipeline.placing.adapt import recheck_pose
 
 DOUBT = Reason("pose_free", "the scan does not fix the pose", "contradicts")
 FREE = FreeMotion((0.0, 0.0, 1.0), -1.0, 1.0)

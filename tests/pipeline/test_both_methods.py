@@ -12,7 +12,7 @@ import trimesh
 
 import damageest
 from damageest.artefacts import Enclosures, Solid
-from damageest.pipeline.other_method import note_other_volumes
+from damageest.pipeline.finding.other_method import note_other_volumes
 from damageest.pipeline.state import FoundSite
 from damageest.registry import Registry
 from damageest.result import Result

@@ -11,7 +11,7 @@ import trimesh
 
 import damageest
 from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Scan
-from damageest.pipeline.datums import note_datums
+from damageest.pipeline.placing.datums import note_datums
 from damageest.pipeline.state import JobState
 from damageest.registry import Registry
 from damageest.result import Result

@@ -19,8 +19,8 @@ from damageest.errors import StageError
 from damageest.geometry.solids import iou, to_arrays, to_manifold
 from damageest.job import Job
 from damageest.output.result_json import build_report, result_schema
-from damageest.pipeline.deposits import make_deposits, refuse_bubbles, separate_deposits
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.judging.deposits import make_deposits, refuse_bubbles, separate_deposits
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.registry import Registry
 from damageest.result import Result

@@ -27,7 +27,7 @@ from damageest.artefacts import (
 )
 from damageest.errors import StageError
 from damageest.pipeline.engine import follow, start
-from damageest.pipeline.sites import take_enclosures
+from damageest.pipeline.finding.sites import take_enclosures
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS
 from damageest.registry.outputs import CHECKS

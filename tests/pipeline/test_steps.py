@@ -19,7 +19,7 @@ from damageest.job import load
 from damageest.pipeline import routes
 from damageest.pipeline.cache import Cache, digest
 from damageest.pipeline.engine import Branch, Engine, Route, start
-from damageest.pipeline.prepare import place_scan
+from damageest.pipeline.placing.prepare import place_scan
 from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import MADE_OF, Candidate, FoundSite, JobState, Reasons, Value, list_given
 from damageest.pipeline.steps import GATHERED, Step, find_value, step

@@ -14,8 +14,8 @@ import damageest
 from damageest.artefacts import Deviation, Floats, Pose, Reason, Scan
 from damageest.cli import app
 from damageest.findings import Sensor, describe_interval
+from damageest.pipeline.judging.uncertainty import sum_uncertainty
 from damageest.pipeline.state import JobState
-from damageest.pipeline.uncertainty import sum_uncertainty
 from damageest.result import Result
 from damageest.stages.scan.simulate import Simulate
 from tests import damaged_box

@@ -32,9 +32,9 @@ from damageest.checks.views.view_overlap import compare_at_site
 from damageest.findings import Budget, Fading, Interval, Uncertainty
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
-from damageest.pipeline.form import measure_at_site
-from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
-from damageest.pipeline.pores import PORE
+from damageest.pipeline.finding.lost_bodies import BY_RAYS_ALONE
+from damageest.pipeline.finding.pores import PORE
+from damageest.pipeline.placing.form import measure_at_site
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.stages.adapt import Adapt

@@ -29,8 +29,8 @@ from damageest.geometry.units import diagnose_scale, diagnose_size, question_siz
 from damageest.job.model import Job
 from damageest.pipeline.cache import Cache
 from damageest.pipeline.engine import Engine, follow, start
-from damageest.pipeline.large_scans import check_crops
-from damageest.pipeline.shared import keep_shared
+from damageest.pipeline.placing.large_scans import check_crops
+from damageest.pipeline.placing.shared import keep_shared
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.pipeline.workspace import is_in_use

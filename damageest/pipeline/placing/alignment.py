@@ -12,10 +12,10 @@ from damageest.geometry.noise import AUTO_TOLERANCE
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.prepare import describe_columns
+from damageest.pipeline.placing.prepare import describe_columns
+from damageest.pipeline.placing.tables import refit_without_table
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.pipeline.tables import refit_without_table
 from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align

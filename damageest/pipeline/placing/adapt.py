@@ -15,8 +15,8 @@ from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
-from damageest.pipeline.datums import note_datums
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.placing.datums import note_datums
 from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step

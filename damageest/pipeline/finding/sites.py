@@ -12,8 +12,8 @@ from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.engine import AnyStep, Branch, Engine, follow
-from damageest.pipeline.lost_bodies import add_lost_bodies
-from damageest.pipeline.pores import add_pores
+from damageest.pipeline.finding.lost_bodies import add_lost_bodies
+from damageest.pipeline.finding.pores import add_pores
 from damageest.pipeline.stage_errors import describe_points
 from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step

@@ -15,10 +15,10 @@ from damageest.geometry.solids import iou, to_solid, unite
 from damageest.geometry.transforms import move_points
 from damageest.output.result_json import to_dict
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.skin_points import note_unused
+from damageest.pipeline.judging.uncertainty import shift_interval, shift_uncertainty
+from damageest.pipeline.placing.skin_points import note_unused
 from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
-from damageest.pipeline.uncertainty import shift_interval, shift_uncertainty
 from damageest.result import Result, Site
 from damageest.rules.notes import make_notes, rank_notes
 

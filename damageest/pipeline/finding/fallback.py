@@ -8,7 +8,7 @@ from damageest.artefacts import Reason, Sites
 from damageest.errors import StageError
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Branch, Engine, Route, follow
-from damageest.pipeline.other_method import note_other_volumes
+from damageest.pipeline.finding.other_method import note_other_volumes
 from damageest.pipeline.state import FoundSite, JobState
 
 BUDGET = 40

@@ -19,8 +19,8 @@ from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.threads import count_threads
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.sites import find_place
-from damageest.pipeline.skin_points import sample_near_damage
+from damageest.pipeline.finding.sites import find_place
+from damageest.pipeline.placing.skin_points import sample_near_damage
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.two_sheets import EXPLAINED, OF_SCAN

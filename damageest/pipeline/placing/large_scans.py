@@ -22,7 +22,7 @@ from damageest.io.large_scans import JoinedViews
 from damageest.io.scans import join_attributes, make_scan
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.form import divide_scan
+from damageest.pipeline.placing.form import divide_scan
 from damageest.pipeline.state import JobState
 from damageest.pipeline.steps import step
 from damageest.stages.scan import ReadScan

@@ -24,9 +24,9 @@ from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_solid, unite
 from damageest.geometry.voxels import measure_area
 from damageest.job.model import Accept, SiteChoice
-from damageest.pipeline.datums import choose_on_datums, has_datums
-from damageest.pipeline.lost_bodies import BY_RAYS_ALONE
-from damageest.pipeline.sites import number_sites
+from damageest.pipeline.finding.lost_bodies import BY_RAYS_ALONE
+from damageest.pipeline.finding.sites import number_sites
+from damageest.pipeline.placing.datums import choose_on_datums, has_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import FreePose, ScanFacts, SiteFacts

@@ -23,10 +23,10 @@ from damageest.geometry.neighbourhoods import find_nearby
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import invert_pose
-from damageest.pipeline.adapt import drop_settled, fit_pose
 from damageest.pipeline.cache import digest
-from damageest.pipeline.datums import describe_moved, has_datums
 from damageest.pipeline.engine import Engine
+from damageest.pipeline.placing.adapt import drop_settled, fit_pose
+from damageest.pipeline.placing.datums import describe_moved, has_datums
 from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step

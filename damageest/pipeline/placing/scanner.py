@@ -13,7 +13,7 @@ from damageest.checks.interval.site_error import WIDTH
 from damageest.checks.model_fit import FittedModel
 from damageest.geometry.scan_field import ScanField
 from damageest.job.scanner import Certificate, ScannerInfo, Temperature
-from damageest.pipeline.form import divide_scan
+from damageest.pipeline.placing.form import divide_scan
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import ScanFacts

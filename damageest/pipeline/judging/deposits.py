@@ -14,7 +14,7 @@ from damageest.geometry.bubbles import find_bubbles
 from damageest.geometry.solids import concatenate_meshes, subtract_lost, to_manifold, to_solid, unite
 from damageest.geometry.touching import separate_sheets
 from damageest.pipeline.engine import Engine
-from damageest.pipeline.pores import PORE
+from damageest.pipeline.finding.pores import PORE
 from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Failures, FoundSite, JobState
 from damageest.pipeline.steps import step

@@ -14,10 +14,10 @@ from damageest.checks.views.two_sheets import Sheets, measure_sheets, measure_tw
 from damageest.findings import Explained, Sensor
 from damageest.geometry.scan_field import ScanField
 from damageest.job.model import Accept
-from damageest.pipeline.datums import choose_on_datums
+from damageest.pipeline.judging.uncertainty import limit_doubtful
+from damageest.pipeline.placing.datums import choose_on_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.pipeline.uncertainty import limit_doubtful
 from damageest.rules import ScanFacts
 from damageest.rules.misplaced_view import AGAINST
 from damageest.rules.two_sheets import EXPLAINED, OF_SCAN, explains

@@ -1,0 +1,1 @@
+"""The steps from damaged points to the volume of each site."""
