@@ -52,14 +52,16 @@ def apply_foreign_rule(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Rea
     except BaseException as error:
         if is_interrupt(error):
             raise KeyboardInterrupt from error
-        return [_tell_failed(rule, f"failed: {type(error).__name__}: {clean_message(error, 400)}")]
+        return [_describe_failed(rule, f"failed: {type(error).__name__}: {clean_message(error, 400)}")]
     for reason in found:
         if not isinstance(reason, Reason):
-            return [_tell_failed(rule, f"gave a {type(reason).__name__}, and has to give Reasons")]
+            return [_describe_failed(rule, f"gave a {type(reason).__name__}, and has to give Reasons")]
         if reason.code != rule.code:
-            return [_tell_failed(rule, f"gave a reason with the code '{clean_message(reason.code, 80)}', not its own")]
+            return [
+                _describe_failed(rule, f"gave a reason with the code '{clean_message(reason.code, 80)}', not its own")
+            ]
         if reason.effect not in ORDER:
-            return [_tell_failed(rule, f"gave a reason with an effect that is none of {', '.join(ORDER)}")]
+            return [_describe_failed(rule, f"gave a reason with an effect that is none of {', '.join(ORDER)}")]
     return found
 
 
@@ -68,7 +70,7 @@ def name_rule(rule: Rule) -> str:
     return f"the rule {type(rule).__qualname__} ('{rule.code}') of {rule.owner}"
 
 
-def _tell_failed(rule: Rule, why: str) -> Reason:
+def _describe_failed(rule: Rule, why: str) -> Reason:
     return Reason(
         RULE_FAILED,
         f"a check could not be made: {name_rule(rule)} {why}",

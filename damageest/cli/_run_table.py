@@ -144,10 +144,10 @@ def list_surplus(items: Sequence[Surplus], unit: str) -> list[str]:
     small = {kind: some[MOST_SURPLUS:] for kind, some in kinds.items() if len(some) > MOST_SURPLUS}
     folded = {item.id for some in small.values() for item in some}
     lines = [_describe_surplus(item, unit) for item in items if item.id not in folded]
-    return [*lines, *(_fold_surplus(kind, some, unit) for kind, some in small.items())]
+    return [*lines, *(_merge_surplus(kind, some, unit) for kind, some in small.items())]
 
 
-def _fold_surplus(kind: str, items: Sequence[Surplus], unit: str) -> str:
+def _merge_surplus(kind: str, items: Sequence[Surplus], unit: str) -> str:
     """One line for many surpluses of a kind, with the volume of those that are closed, and an estimate for others."""
     closed = [item.volume for item in items if item.volume is not None]
     guessed = sum(item.estimate for item in items if item.volume is None)

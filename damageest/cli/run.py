@@ -17,7 +17,7 @@ from damageest.cli._run_table import print_table
 from damageest.cli._streams import keep_for_results, say, say_result
 from damageest.geometry.threads import use_threads
 from damageest.isolation.limits import STAGE_SECONDS, Limits, limit_this_process, parse_memory
-from damageest.isolation.notes import at_work, note_job
+from damageest.isolation.shared_notes import at_work, note_job
 
 IMPORT, IMPORT_SECONDS = "import of the pipeline", 120.0
 """The first step of a run, and after how many seconds it is ended. Without byte-code and from a slow disk it takes a

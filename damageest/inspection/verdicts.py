@@ -58,7 +58,7 @@ def judge_site(
     noise: float, unit: str,
 ) -> Verdict:  # fmt: skip
     """Judges a site by every point that lies on it. ``findings``: all of the part."""
-    wrong = [f"{one.kind} {one.volume:.4g} {unit}³{_say_more(one)}" for one in findings if number in one.sites]
+    wrong = [f"{one.kind} {one.volume:.4g} {unit}³{_describe_more(one)}" for one in findings if number in one.sites]
     if places is None or landed is None:
         return Verdict(number, "not met" if wrong else "not shown", ", ".join(wrong) or "no skin of its own",
                        0.0, None, None, None)  # fmt: skip
@@ -96,7 +96,7 @@ def judge_whole(
     return WholeVerdict("not shown", ", ".join(hidden)) if hidden else WholeVerdict("met", "")
 
 
-def _say_more(one: Finding) -> str:
+def _describe_more(one: Finding) -> str:
     """Where else a finding lies."""
     others = len(one.sites) > 1
     return " (also on other sites or elsewhere)" if others else ""

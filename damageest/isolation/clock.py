@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 
-from damageest.isolation.notes import Entry, Page
+from damageest.isolation.shared_notes import Entry, Page
 
 TICK = 0.5
 """Longest time between two looks, in seconds. A process that is stopped for longer, as by Ctrl-Z, loses no time."""

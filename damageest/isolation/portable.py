@@ -22,8 +22,8 @@ from pathlib import Path
 
 from damageest.isolation.clock import TICK
 from damageest.isolation.interpreter import find_python
-from damageest.isolation.notes import Entry, Page
 from damageest.isolation.one_thread import ONE_THREAD
+from damageest.isolation.shared_notes import Entry, Page
 from damageest.isolation.transfer import receive_bytes
 
 CODE = (

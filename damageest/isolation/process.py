@@ -22,9 +22,9 @@ from damageest.isolation import portable, transfer
 from damageest.isolation.clock import TICK, WALL, Clock
 from damageest.isolation.interpreter import find_python
 from damageest.isolation.limits import Limits
-from damageest.isolation.notes import Page
 from damageest.isolation.one_thread import ONE_THREAD
 from damageest.isolation.serve import Usage
+from damageest.isolation.shared_notes import Page
 from damageest.isolation.transfer import receive, send
 
 START_SECONDS = 120.0

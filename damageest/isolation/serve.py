@@ -20,8 +20,8 @@ from typing import Any
 
 from damageest.isolation import portable, transfer
 from damageest.isolation.limits import limited
-from damageest.isolation.notes import Page, find_place, note_on, note_part
 from damageest.isolation.parent import end_with_parent
+from damageest.isolation.shared_notes import Page, find_place, note_on, note_part
 from damageest.isolation.telling import listen
 from damageest.isolation.transfer import load, receive, receive_parts, send
 

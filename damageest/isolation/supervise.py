@@ -22,8 +22,8 @@ from damageest.errors import StageError
 from damageest.isolation.clock import TICK, Clock
 from damageest.isolation.failures import describe_end
 from damageest.isolation.limits import Limits
-from damageest.isolation.notes import Entry, Page, close_entry, note_on
 from damageest.isolation.parent import end_with_parent
+from damageest.isolation.shared_notes import Entry, Page, close_entry, note_on
 
 PASSED = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT") if hasattr(signal, name))
 """Signals that are passed on to the fork."""

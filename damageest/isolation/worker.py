@@ -16,9 +16,9 @@ from damageest.errors import StageError
 from damageest.isolation import serve
 from damageest.isolation.failures import ProcessError, RemoteTraceback, blame_authors, describe_end, describe_memory
 from damageest.isolation.limits import Limits, format_bytes, measure_free_memory, own_memory
-from damageest.isolation.notes import set_place
 from damageest.isolation.process import Answer, Call, Ended, WorkerProcess
 from damageest.isolation.serve import Usage
+from damageest.isolation.shared_notes import set_place
 
 T = TypeVar("T")
 _workers: dict[tuple[int, str], _Worker] = {}

@@ -80,12 +80,12 @@ def _describe_stage(stage: str, registry: Registry) -> Iterator[str]:
     contracts = [contract for contract in DEFAULTS if contract.stage == stage]
     yield f"## {stage}\n"
     for contract in contracts:
-        yield f"{_unwrap(contract).splitlines()[0]} {_say_when(contract)}\n"
+        yield f"{_unwrap(contract).splitlines()[0]} {_describe_when(contract)}\n"
     for item in registry.of(stage):
         yield from describe_implementation(item)
 
 
-def _say_when(contract: Contract) -> str:
+def _describe_when(contract: Contract) -> str:
     """How often a contract's implementations run, and on which route."""
     often = "Runs once for each site" if contract.per_site else "Runs once per job"
     return f"{often}{', with `method: surface` only' if contract in SURFACE_ONLY else ''}."

@@ -124,7 +124,7 @@ def list_notes(result: Result) -> list[str]:
     for level in ("doubtful", "likely", "proven"):
         chosen = [site for site in result.sites if site.verdict.level == level]
         told = [(site.id, reason) for site in chosen for reason in site.verdict.reasons]
-        for one in _fold_alike(join_reasons(told)):
+        for one in _merge_alike(join_reasons(told)):
             verb, decides = ("is" if len(one.sites) == 1 else "are"), level != "proven" and one.reason.effect in DECIDES
             notes.append((0 if decides else 1, f"{one.names} {verb} {level}: {one.reason}"))
     told = [(site.id, note) for site in result.sites for note in site.warnings]
@@ -132,7 +132,7 @@ def list_notes(result: Result) -> list[str]:
     return [text for _, text in sorted(notes, key=lambda note: note[0])]
 
 
-def _fold_alike(reasons: Sequence[SiteReason]) -> tuple[SiteReason, ...]:
+def _merge_alike(reasons: Sequence[SiteReason]) -> tuple[SiteReason, ...]:
     """The reasons, with those of one code that many sites have in different words as one: the words of the first."""
     folded: dict[str, SiteReason] = {}
     many = {one.reason.code for one in reasons if sum(o.reason.code == one.reason.code for o in reasons) >= FOLDED}

@@ -98,7 +98,7 @@ ITEMS = """
 import json, sys
 from damageest.cli import _process
 from damageest.isolation.limits import limit_this_process
-from damageest.isolation.notes import at_work, note_job
+from damageest.isolation.shared_notes import at_work, note_job
 faults = json.loads(sys.argv[1])
 def work(first):
     for number in range(first, len(faults)):

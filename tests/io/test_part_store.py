@@ -13,7 +13,7 @@ from damageest.artefacts import Mesh
 from damageest.io import part_store
 from damageest.io.part_store import recall, use_part_store
 from damageest.result import Result
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 from damageest.stages.align.symmetry import prepare_part as _prepare_part
 
 

@@ -49,7 +49,7 @@ def fall_back(first: Route, second: Route, compares: bool = False) -> Branch:
         done = {cluster for site in sites for cluster in site.clusters}
         lacking = next((error for error in again.failures if error.extra), None)
         if lacking is not None and any(error.site in done for error in again.failures):
-            again = again.with_value(JobState.warnings, (*again.warnings, _tell_missing(lacking)))
+            again = again.with_value(JobState.warnings, (*again.warnings, _note_missing(lacking)))
         failures = tuple(drop_tried(error) for error in again.failures if error.site not in done)
         left = tuple(number for number in left if number not in done)
         failures += (report_exhausted_budget(state.sites, left),) if left else ()
@@ -90,7 +90,7 @@ def drop_tried(error: StageError) -> StageError:
     return error
 
 
-def _tell_missing(error: StageError) -> Reason:
+def _note_missing(error: StageError) -> Reason:
     """What a result lacks where the second route could not be tried, as it would be with all extras."""
     text = f"the scan contradicts a site of method implicit, and method surface cannot be tried: {error.message}"
     return Reason("fell_back", text, remedy=error.remedy)

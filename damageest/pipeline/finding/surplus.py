@@ -151,7 +151,7 @@ def _close(engine: Engine, turned: JobState, found: tuple[Surplus, ...], kept: S
     if sum(item.area for item in metal) > MOST_SKIN * turned.part.area:
         note = "surplus covers most of the part: check pose, unit and tolerance; its volume was not computed"
         return done + [replace(item, notes=(*item.notes, note)) for item in metal]
-    open_ = {number: _say_why_open(item, layer) for number, item in enumerate(metal, 1)}
+    open_ = {number: _describe_why_open(item, layer) for number, item in enumerate(metal, 1)}
     closed = [number for number, why in open_.items() if not why]
     # the numbers of the clusters that are closed, in the order of their own numbers below
     tried = sorted(closed, key=lambda number: -metal[number - 1].estimate)[:MOST_CLOSED]
@@ -185,7 +185,7 @@ def _choose_layer(state: JobState, found: tuple[Surplus, ...]) -> float:
     return max(layer, EXPLAINED * sheets.apart)
 
 
-def _say_why_open(item: Surplus, layer: float) -> str:
+def _describe_why_open(item: Surplus, layer: float) -> str:
     """Why no more than an estimate is asked of a surplus; empty where it is to be closed."""
     if len(item.points) < FEW and item.share < FEW_SHARE:
         return f"it has {len(item.points)} points"

@@ -13,7 +13,7 @@ from damageest.geometry.transforms import move_points
 from damageest.pipeline.cache import digest
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.placing.prepare import describe_columns
-from damageest.pipeline.placing.tables import refit_without_table
+from damageest.pipeline.placing.shared_table import refit_without_table
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes

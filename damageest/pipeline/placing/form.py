@@ -159,7 +159,7 @@ def fit_model(
         found = measure_fit(
             part, aligned.points[own], field.distance[own], aligned.noise, tolerance, unit, views, corrected_scale
         )
-    found = _tell_adapted(found, adapted)
+    found = _note_adapted(found, adapted)
     told = found is not None and (found.fit.model != "ok" or found.fit.corrected_scale != 1)
     if found is not None and told:
         remedy = REMEDIES.get(found.fit.model, "")
@@ -179,10 +179,10 @@ def _leave_surroundings_out(aligned: Scan, surplus: tuple[Surplus, ...], toleran
 
 
 @overload
-def _tell_adapted(fitted: FittedModel, adapted: AdaptedPart | None) -> FittedModel: ...
+def _note_adapted(fitted: FittedModel, adapted: AdaptedPart | None) -> FittedModel: ...
 @overload
-def _tell_adapted(fitted: None, adapted: AdaptedPart | None) -> None: ...
-def _tell_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> FittedModel | None:
+def _note_adapted(fitted: None, adapted: AdaptedPart | None) -> None: ...
+def _note_adapted(fitted: FittedModel | None, adapted: AdaptedPart | None) -> FittedModel | None:
     """The fit in words that do not call an adapted part the part as designed."""
     if fitted is None or adapted is None:
         return fitted
@@ -213,9 +213,9 @@ def review_model_fit(
         seen = float(skin.cells.areas[skin.perhaps_seen].sum() / skin.cells.areas.sum())
         partly = describe_view_of(fitted.fit, seen, field.part.diagonal, unit, field.tolerance)
         fit = describe_fit(fitted.fit, unit, field.tolerance, partly=partly)
-        return _tell_adapted(replace(fitted, fit=fit), adapted), warnings
+        return _note_adapted(replace(fitted, fit=fit), adapted), warnings
     fit = describe_fit(replace(fitted.fit, model="open"), unit, field.tolerance, doubts)
-    fit = _tell_adapted(replace(fitted, fit=fit), adapted).fit
+    fit = _note_adapted(replace(fitted, fit=fit), adapted).fit
     # a corrected scale was reported in a note whose text is no longer true
     kept = [note for note in warnings if note.code != "model_fit"]
     remedy = "look at the report: colour the scan by distance"

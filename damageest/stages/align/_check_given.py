@@ -11,9 +11,9 @@ from damageest.geometry.transforms import move_points
 from damageest.stages.align.handedness.mirror import MIN_GAIN as LEAST_OFF
 from damageest.stages.align.handedness.mirror import MirrorTest, check_handedness
 from damageest.stages.align.refine.check_pose import check_pose
-from damageest.stages.align.refine.fit import Fit, fit
+from damageest.stages.align.refine.robust_fit import Fit, fit
 from damageest.stages.align.surface.frame import Frame
-from damageest.stages.align.surface.points import draw_evenly, orient_scan, orient_surface
+from damageest.stages.align.surface.oriented_points import draw_evenly, orient_scan, orient_surface
 from damageest.stages.align.symmetry.prepare_part import prepare_part
 from damageest.stages.align.wear.check_worn import check_with_wear, measure_given_wear
 

@@ -9,10 +9,10 @@ from damageest.errors import StageError
 from damageest.stages.align.datum.by_system import finish_by_datum
 from damageest.stages.align.datum.option import Datum
 from damageest.stages.align.datum.system import find_datum
-from damageest.stages.align.refine.fit import fit
 from damageest.stages.align.refine.largest_piece import prefer_largest_piece
+from damageest.stages.align.refine.robust_fit import fit
 from damageest.stages.align.surface.frame import Frame
-from damageest.stages.align.surface.points import draw_evenly, orient_scan
+from damageest.stages.align.surface.oriented_points import draw_evenly, orient_scan
 from damageest.stages.align.symmetry.ambiguity import find_loose_motions
 from damageest.stages.align.wear.check_worn import check_with_wear
 from damageest.stages.align.wear.finish import Finish

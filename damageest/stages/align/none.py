@@ -37,7 +37,7 @@ class KnownPose(Align):
         most. Raises StageError where the scan contradicts it."""
         from damageest.stages.align._check_given import check_given
         from damageest.stages.align.surface.frame import MIN_POINTS
-        from damageest.stages.align.surface.planes import PartSurface
+        from damageest.stages.align.surface.plane_grid import PartSurface
 
         T = self.known_pose
         if not len(scan.points):

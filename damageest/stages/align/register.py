@@ -51,11 +51,11 @@ class Register(Align):
         from damageest.stages.align.handedness.mirror import MIN_GAIN, MirrorTest, check_handedness
         from damageest.stages.align.handedness.normals import SignedNormals, note_inward, prefer_outward
         from damageest.stages.align.handedness.scale import check_scale
-        from damageest.stages.align.refine.fit import fit
+        from damageest.stages.align.refine.robust_fit import fit
         from damageest.stages.align.search.pairs import propose_poses
         from damageest.stages.align.search.search import search
         from damageest.stages.align.surface.frame import MIN_POINTS, Frame
-        from damageest.stages.align.surface.points import draw_evenly, draw_stratified, orient_scan
+        from damageest.stages.align.surface.oriented_points import draw_evenly, draw_stratified, orient_scan
         from damageest.stages.align.symmetry.ambiguity import describe_choice, find_loose_motions, note_ambiguity
         from damageest.stages.align.symmetry.choose import COARSE, Choice, choose_pose
         from damageest.stages.align.symmetry.prepare_part import prepare_part

@@ -149,7 +149,7 @@ def open_cavity(
         return opening, whole ^ opening
 
     opening, opened = cut(column)
-    kept, aside = _tell_apart(opened, lost, tolerance)
+    kept, aside = _separate(opened, lost, tolerance)
     if aside:
         opening, opened = cut(column.close_below(aside, kept, turn))
     if others is not None:
@@ -162,7 +162,7 @@ def open_cavity(
     return cavity, to_solid(opening, origin)
 
 
-def _tell_apart(opened: Any, lost: Any, tolerance: float) -> tuple[list[Any], list[Any]]:
+def _separate(opened: Any, lost: Any, tolerance: float) -> tuple[list[Any], list[Any]]:
     """The pieces of a Manifold that touch ``lost``, and those that do not."""
     pieces = [each for each in opened.decompose() if each.volume() > 0]
     touch = [touches(each, lost, tolerance) for each in pieces]

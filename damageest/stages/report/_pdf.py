@@ -126,7 +126,7 @@ def _summarise(book: Book, image: bytes) -> list[Any]:
     both.setStyle([("VALIGN", (0, 0), (-1, -1), "TOP"), ("LEFTPADDING", (0, 0), (-1, -1), 0)])
     story = [
         write(result.name, 15, True, spaceAfter=3),
-        write(_say_verdict(book), 10, True, LEVELS[choose_tone(result)], spaceAfter=5),
+        write(_write_verdict(book), 10, True, LEVELS[choose_tone(result)], spaceAfter=5),
         both,
     ]
     if result.sites:
@@ -141,7 +141,7 @@ def _summarise(book: Book, image: bytes) -> list[Any]:
     return story
 
 
-def _say_verdict(book: Book) -> str:
+def _write_verdict(book: Book) -> str:
     result, words = book.result, book.words
     if not result.sites:
         if result.failures:

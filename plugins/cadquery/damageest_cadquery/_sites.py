@@ -98,7 +98,7 @@ class SiteWork:
         with at_work(name_crossed(site.number), request.allow(request.seconds, request.solving)):
             skipped = name_crossed(site.number) in request.skipped
             crossed = [] if skipped else find_crossed(self.solids, self.faces, site.damage, request.tolerance)
-        told = f"{last}; it lies on {_tell_faces(site, request.part, names)}"
+        told = f"{last}; it lies on {_report_faces(site, request.part, names)}"
         return f"{told}; in the CAD file these cross one another: {list_faces(crossed, names)}" if crossed else told
 
     def _find_deposit(self, site: SiteInput, cavity: Solid, exact: Exact) -> tuple[ExactDeposit | None, DepositForm]:
@@ -153,7 +153,7 @@ def _list_stock(deposit: Solid) -> list[int]:
     return [number for number, height in deposit.heights if height > 0] if isinstance(deposit, Deposit) else []
 
 
-def _tell_faces(site: SiteInput, part: Part, names: Sequence[str]) -> str:
+def _report_faces(site: SiteInput, part: Part, names: Sequence[str]) -> str:
     """The CAD faces that a damage takes skin of."""
     assert part.faces_brep is not None
     outer = site.damage.triangles[~find_inner_faces(site.damage, part)].mean(axis=1)

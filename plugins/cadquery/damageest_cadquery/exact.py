@@ -121,13 +121,13 @@ def _write_within(request: Request, budget: float) -> ExportedFiles:
     )
     if isinstance(done, Made):
         notes += made.notes
-        notes += _tell_missing(request, (*made.files, *made.notes))
+        notes += _note_missing(request, (*made.files, *made.notes))
     elif notes:
         notes += ("damage.step and undamaged.step have facets too",)
     return ExportedFiles(made.files, notes, exact=dict(sorted(forms.items())), warnings=notes)
 
 
-def _tell_missing(request: Request, said: Sequence[str]) -> tuple[str, ...]:
+def _note_missing(request: Request, said: Sequence[str]) -> tuple[str, ...]:
     """Notes on assemblies that were not written, and of which nothing was said: no facets stand in for them."""
     names = [f"{place}result.step" for place in request.places] if request.assembly and request.bodies else []
     return tuple(f"{name} was not written: {SPENT}" for name in names if not any(name in text for text in said))

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 
 from damageest.artefacts import Floats, Part, Scan, Truth
 from damageest.geometry.noise import measure_noise_and_spacing
-from damageest.stages.align.surface.planes import PartSurface
-from damageest.stages.align.surface.points import orient_surface
+from damageest.stages.align.surface.oriented_points import orient_surface
+from damageest.stages.align.surface.plane_grid import PartSurface
 from damageest.stages.scan.simulate import Simulate
 
 

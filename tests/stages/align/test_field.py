@@ -8,7 +8,7 @@ import trimesh
 
 from damageest.artefacts import Mesh
 from damageest.geometry.distance import signed_distance
-from damageest.stages.align.surface.planes import NEAR, PartSurface
+from damageest.stages.align.surface.plane_grid import NEAR, PartSurface
 from damageest.stages.align.symmetry.prepare_part import prepare_part
 
 

@@ -17,7 +17,7 @@ from scipy.spatial.transform import Rotation
 from damageest.artefacts import Floats, Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align.icp import Icp
-from damageest.stages.align.refine.fit import fit
+from damageest.stages.align.refine.robust_fit import fit
 from damageest.stages.align.surface.frame import Frame
 from damageest.stages.align.wear.finish import finish_pose
 from damageest.stages.scan.simulate import Simulate

@@ -9,8 +9,8 @@ from align_scenes import make_bracket, make_plate, measure_apart, scene, watch_b
 from damageest.artefacts import Part, Pose, Scan
 from damageest.errors import StageError
 from damageest.stages.align.register import Register
-from damageest.stages.align.search.evidence import DECISIVE, weigh_poses
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.search.weigh_poses import DECISIVE, weigh_poses
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 RIGHT = 0.03
 """Distance from the true pose, in diagonals, up to which a pose is right."""

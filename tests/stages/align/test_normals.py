@@ -12,7 +12,7 @@ import damageest
 from damageest.artefacts import Floats, Part, Scan
 from damageest.stages.align.handedness.normals import SignedNormals
 from damageest.stages.align.register import Register
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 
 def make_signs(kind: str, count: int) -> Floats:

@@ -13,7 +13,7 @@ from damageest.artefacts import Floats, Mesh, Scan
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import to_arrays
 from damageest.geometry.transforms import move_points
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 from damageest.stages.align.symmetry.prepare_part import PreparedPart, prepare_part
 
 

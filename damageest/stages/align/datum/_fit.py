@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.stages.align.datum._points import OnDatum
 from damageest.stages.align.datum.system import Feature
-from damageest.stages.align.wear.explain import explain
+from damageest.stages.align.wear.explained import explain
 from damageest.stages.align.wear.one_sided import measure_bands, propose_motions, search_motions
 
 WEAK = 0.25

@@ -14,7 +14,7 @@ from damageest.errors import StageError
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.voxels import number_faced_cubes
 from damageest.stages.align.datum.system import Feature
-from damageest.stages.align.wear.patches import Patches
+from damageest.stages.align.wear.skin_patches import Patches
 
 PATCHES = 60
 """Patches that a datum is divided in where it has few points; of many points, sixteen make a patch."""

@@ -14,13 +14,13 @@ from damageest.stages.align.datum._fit import fit_datum
 from damageest.stages.align.datum._points import gather_points
 from damageest.stages.align.datum._words import REMEDY, Fits, describe_system, list_motions
 from damageest.stages.align.datum.system import DatumSystem
-from damageest.stages.align.refine.fit import Fit
+from damageest.stages.align.refine.robust_fit import Fit
 from damageest.stages.align.surface.frame import Frame
 from damageest.stages.align.wear.datum_skin import DatumSkin
 from damageest.stages.align.wear.finish import MIN_PATCHES, MIN_STEP, Finish, Found, finish_pose, search_pose
 from damageest.stages.align.wear.free import find_freedoms
 from damageest.stages.align.wear.one_sided import measure_bands, measure_movement
-from damageest.stages.align.wear.patches import REACH, Patches, find_basis, measure_patches
+from damageest.stages.align.wear.skin_patches import REACH, Patches, find_basis, measure_patches
 from damageest.stages.align.wear.words import name_motion, to_free_motion
 
 SAMPLES = 5000
@@ -50,7 +50,7 @@ def finish_by_datum(
     """As `finish_pose`, also for a datum system, which is fitted to the points ``raw`` (M,3): all that are at hand."""
     if not isinstance(datum, DatumSystem):
         finish = finish_pose(frame, points, best, noise, tolerance, unit, datum)
-        return finish if datum is None else _question_list(frame, points, finish, noise, tolerance, unit)
+        return finish if datum is None else _check_list(frame, points, finish, noise, tolerance, unit)
     pose, free, fits, spread = _fit_datums(frame, raw, best.pose, noise, tolerance, datum)
     pose, found = _fit_rest(frame, points, pose, free, noise, tolerance)
     freedoms: tuple[FreeMotion, ...] = ()
@@ -61,11 +61,11 @@ def finish_by_datum(
     told = describe_system(frame, datum, fits, free, tolerance, unit)
     patches = measure_patches(frame.target, points, pose, noise, tolerance)
     band = measure_bands(patches, noise, FORM * tolerance)
-    doubts = told.doubts + _doubt_outside(frame, patches, band, tolerance, unit)
-    doubts += _doubt_open(frame, patches, free)
+    doubts = told.doubts + _check_outside(frame, patches, band, tolerance, unit)
+    doubts += _check_open(frame, patches, free)
     is_held = not doubts
     if is_held:
-        doubts = _tell_decided(frame, patches, noise, tolerance, unit)
+        doubts = _note_decided(frame, patches, noise, tolerance, unit)
     depth = 0.0 if not is_held else _measure_depth(patches, band)
     notes = (*told.notes, *(one.text for one in freedoms))
     scaled = np.concatenate([spread[:3], spread[3:] * frame.size])
@@ -75,13 +75,13 @@ def finish_by_datum(
     )  # fmt: skip
 
 
-def _question_list(frame: Frame, points: Floats, finish: Finish, noise: float, tolerance: float, unit: str) -> Finish:
+def _check_list(frame: Frame, points: Floats, finish: Finish, noise: float, tolerance: float, unit: str) -> Finish:
     """The finish by a list of datums, which is asked what a system is: may a datum be worn, and what does it decide?"""
     patches = measure_patches(frame.target, points, finish.fit.pose, noise, tolerance)
     band = measure_bands(patches, noise, FORM * tolerance)
-    doubts = _doubt_outside(frame, patches, band, tolerance, unit)
+    doubts = _check_outside(frame, patches, band, tolerance, unit)
     if not doubts and not finish.doubts:
-        doubts = _tell_decided(frame, patches, noise, tolerance, unit)
+        doubts = _note_decided(frame, patches, noise, tolerance, unit)
     return replace(finish, doubts=finish.doubts + doubts)
 
 
@@ -160,7 +160,7 @@ def _fit_rest(
     return pose, (patches, found)
 
 
-def _doubt_outside(frame: Frame, patches: Patches, band: Floats, tolerance: float, unit: str) -> tuple[Reason, ...]:
+def _check_outside(frame: Frame, patches: Patches, band: Floats, tolerance: float, unit: str) -> tuple[Reason, ...]:
     """A doubt where much of the skin lies outside of the part, as after the fit to a worn datum."""
     if not len(patches.weight):
         return ()
@@ -175,7 +175,7 @@ def _doubt_outside(frame: Frame, patches: Patches, band: Floats, tolerance: floa
     return (Reason("datum_worn", text, "contradicts", amount, unit, remedy=REMEDY),)
 
 
-def _tell_decided(frame: Frame, patches: Patches, noise: float, tolerance: float, unit: str) -> tuple[Reason, ...]:
+def _note_decided(frame: Frame, patches: Patches, noise: float, tolerance: float, unit: str) -> tuple[Reason, ...]:
     """What is to be known where the scan fits as well, or better, in poses that the datums exclude: a datum that is
     worn all over looks as an opposite face that is worn."""
     if len(patches.weight) < MIN_PATCHES or not patches.basis.shape[1]:
@@ -195,7 +195,7 @@ def _tell_decided(frame: Frame, patches: Patches, noise: float, tolerance: float
     return (Reason("datum_decides", text, "note", amount, unit, remedy="check these datums for wear"),)
 
 
-def _doubt_open(frame: Frame, patches: Patches, free: Floats) -> tuple[Reason, ...]:
+def _check_open(frame: Frame, patches: Patches, free: Floats) -> tuple[Reason, ...]:
     """A doubt where neither the datums nor the skin that was scanned fix the pose: motions among those that the datums
     leave ``free`` (6,F), which move the part's skin but none that was seen."""
     if not free.shape[1]:

@@ -9,8 +9,8 @@ from damageest.stages.align.datum.by_system import finish_by_datum
 from damageest.stages.align.datum.system import DatumSystem
 from damageest.stages.align.refine.by_patches import refine_pose
 from damageest.stages.align.refine.check_pose import PoseCheck
-from damageest.stages.align.refine.fit import Fit
 from damageest.stages.align.refine.largest_piece import prefer_largest_piece
+from damageest.stages.align.refine.robust_fit import Fit
 from damageest.stages.align.surface.frame import Frame
 from damageest.stages.align.wear.check_worn import check_with_wear
 from damageest.stages.align.wear.datum_skin import DatumSkin

@@ -12,11 +12,11 @@ from damageest.geometry.transforms import move_points
 from damageest.stages.align.datum.last_fit import FIRST
 from damageest.stages.align.handedness.normals import measure_inward
 from damageest.stages.align.refine.check_pose import DOUBTFUL_AGREEMENT, NEAR, PoseCheck, check_pose
-from damageest.stages.align.refine.fit import Fit, fit, fit_each
-from damageest.stages.align.search.evidence import DECISIVE, weigh_poses
+from damageest.stages.align.refine.robust_fit import Fit, fit, fit_each
 from damageest.stages.align.search.pairs import propose_poses
 from damageest.stages.align.search.search import KEPT, search
-from damageest.stages.align.surface.points import OrientedPoints
+from damageest.stages.align.search.weigh_poses import DECISIVE, weigh_poses
+from damageest.stages.align.surface.oriented_points import OrientedPoints
 from damageest.stages.align.symmetry.choose import COARSE
 from damageest.stages.align.symmetry.prepare_part import PreparedPart
 from damageest.stages.align.symmetry.symmetries import make_reflections
@@ -144,7 +144,7 @@ def check_handedness(test: MirrorTest, best: Fit, check: PoseCheck, rng: np.rand
         return result
     if check.cover < LITTLE and of_mirrored.cover < LITTLE:
         return replace(result, doubts=(_describe_doubt(check, of_mirrored),))
-    raise _build_error(check, of_mirrored, _tell_which(test, mirrored.pose))
+    raise _build_error(check, of_mirrored, _describe_which(test, mirrored.pose))
 
 
 def _is_better(mirrored: PoseCheck, check: PoseCheck) -> bool:
@@ -218,7 +218,7 @@ def _describe_doubt(check: PoseCheck, mirrored: PoseCheck) -> Reason:
     return Reason("mirrored", text, "contradicts", mirrored.agreement, remedy="scan more of the part")
 
 
-def _tell_which(test: MirrorTest, pose: Floats) -> str:
+def _describe_which(test: MirrorTest, pose: Floats) -> str:
     """Which file was mirrored, where the scan's own normals tell: a program that mirrors points and leaves the order of
     each triangle's corners turns them inward. Empty where they do not; ``pose`` (4,4) mirrors."""
     scan = test.oriented

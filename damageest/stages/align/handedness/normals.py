@@ -12,10 +12,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Scan
 from damageest.geometry.transforms import move_points
-from damageest.stages.align.refine.fit import Fit
+from damageest.stages.align.refine.robust_fit import Fit
 from damageest.stages.align.surface.frame import Frame
-from damageest.stages.align.surface.planes import PartSurface
-from damageest.stages.align.surface.points import OrientedPoints, draw_stratified
+from damageest.stages.align.surface.oriented_points import OrientedPoints, draw_stratified
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 ASKED = 10_000
 """Number of points whose normals are compared with those of the part."""

@@ -11,11 +11,11 @@ from damageest.errors import StageError
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.stages.align.handedness.mirror import MirrorTest, measure_share_on
 from damageest.stages.align.refine.check_pose import DOUBTFUL_AGREEMENT, PoseCheck
-from damageest.stages.align.refine.fit import MAX_DRIFT, REACH, Fit, solve_gauss_newton
+from damageest.stages.align.refine.robust_fit import MAX_DRIFT, REACH, Fit, solve_gauss_newton
 from damageest.stages.align.search.pairs import propose_poses
 from damageest.stages.align.search.search import search
-from damageest.stages.align.surface.planes import UNKNOWN
-from damageest.stages.align.surface.points import OrientedPoints
+from damageest.stages.align.surface.oriented_points import OrientedPoints
+from damageest.stages.align.surface.plane_grid import UNKNOWN
 from damageest.stages.align.symmetry.choose import COARSE
 
 ASKED = 0.95

@@ -10,8 +10,8 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.geometry.transforms import make_motions, move_points
 from damageest.geometry.voxels import number_faced_cubes
-from damageest.stages.align.refine.fit import REACH, Fit, solve_gauss_newton
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.refine.robust_fit import REACH, Fit, solve_gauss_newton
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 PATCH = 4.0
 """Edge of the cubes, in mean distances between points: about sixteen points on a face."""

@@ -9,9 +9,9 @@ import numpy as np
 from damageest.artefacts import Floats, Reason
 from damageest.errors import StageError
 from damageest.geometry.transforms import move_points
-from damageest.stages.align.refine.fit import Fit
-from damageest.stages.align.surface.planes import UNKNOWN, PartSurface
-from damageest.stages.align.surface.points import draw_stratified, orient_surface
+from damageest.stages.align.refine.robust_fit import Fit
+from damageest.stages.align.surface.oriented_points import draw_stratified, orient_surface
+from damageest.stages.align.surface.plane_grid import UNKNOWN, PartSurface
 
 MIN_ON_PART, MIN_ON_PART_IF_COVERED, MIN_COVER = 0.38, 0.15, 0.45
 """Share of the scanned area that must lie on the part. The second, smaller share is enough where points cover

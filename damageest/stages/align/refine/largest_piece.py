@@ -6,8 +6,8 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.transforms import move_points
-from damageest.stages.align.refine.fit import REACH, Fit, fit
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.refine.robust_fit import REACH, Fit, fit
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 WIDE = 1.2
 """How much wider than the noise explains the band of a fit has to be for another pose to be looked for."""

@@ -17,7 +17,7 @@ from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import order_integers
 from damageest.geometry.threads import cut_evenly, map_in_threads
 from damageest.geometry.vectors import normalise
-from damageest.stages.align.surface.points import OrientedPoints, draw_by_direction
+from damageest.stages.align.surface.oriented_points import OrientedPoints, draw_by_direction
 
 MODEL_POINTS, MODEL_PAIRS = 1600, 800_000
 SCAN_POINTS, SCAN_PAIRS, KEPT_PAIRS = 1200, 40_000, 6000

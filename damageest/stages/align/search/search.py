@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.threads import cut_evenly, map_in_threads
 from damageest.geometry.transforms import make_motions
-from damageest.stages.align.surface.planes import Floats32, PlaneGrid
-from damageest.stages.align.surface.points import OrientedPoints, draw_by_direction
+from damageest.stages.align.surface.oriented_points import OrientedPoints, draw_by_direction
+from damageest.stages.align.surface.plane_grid import Floats32, PlaneGrid
 
 CHUNK = 200_000
 """Number of points that a thread looks up at once, to limit memory."""

@@ -10,7 +10,7 @@ from pydantic import AfterValidator
 
 from damageest.artefacts import Floats, Mesh, Part, Scan
 from damageest.errors import StageError
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 MIN_POINTS = 200
 """Number of scan points that an alignment needs."""

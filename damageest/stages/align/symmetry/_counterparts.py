@@ -7,8 +7,8 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.geometry.transforms import make_motions
 from damageest.stages.align.search.search import refine, score, select_distinct
-from damageest.stages.align.surface.planes import PartSurface, PlaneGrid
-from damageest.stages.align.surface.points import OrientedPoints, draw_by_direction, orient_surface
+from damageest.stages.align.surface.oriented_points import OrientedPoints, draw_by_direction, orient_surface
+from damageest.stages.align.surface.plane_grid import PartSurface, PlaneGrid
 
 STEP = 5.0
 """Step of the angles, in degrees."""

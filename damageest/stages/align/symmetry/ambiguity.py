@@ -9,10 +9,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, FreeMotion, Reason
 from damageest.geometry.transforms import make_motions, move_points
-from damageest.stages.align.refine.fit import fit, robust_cost
+from damageest.stages.align.refine.robust_fit import fit, robust_cost
 from damageest.stages.align.surface.frame import Frame
-from damageest.stages.align.surface.planes import PartSurface
-from damageest.stages.align.surface.points import orient_surface
+from damageest.stages.align.surface.oriented_points import orient_surface
+from damageest.stages.align.surface.plane_grid import PartSurface
 from damageest.stages.align.symmetry.choose import MANY, Choice, is_worse
 from damageest.stages.align.symmetry.prepare_part import PreparedPart
 from damageest.stages.align.symmetry.symmetries import SAME as SAME_SYMMETRY

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
 from damageest.geometry.transforms import move_points
-from damageest.stages.align.refine.fit import fit, fit_each, robust_cost
-from damageest.stages.align.search.evidence import DECISIVE, weigh_poses
+from damageest.stages.align.refine.robust_fit import fit, fit_each, robust_cost
 from damageest.stages.align.search.search import refine, score, select_distinct
-from damageest.stages.align.surface.planes import PartSurface, PlaneGrid
-from damageest.stages.align.surface.points import OrientedPoints
+from damageest.stages.align.search.weigh_poses import DECISIVE, weigh_poses
+from damageest.stages.align.surface.oriented_points import OrientedPoints
+from damageest.stages.align.surface.plane_grid import PartSurface, PlaneGrid
 from damageest.stages.align.symmetry._counterparts import turn_poses
 from damageest.stages.align.symmetry._turns import Axis, find_common_axis, group_turns
 from damageest.stages.align.symmetry.prepare_part import PreparedPart

@@ -11,8 +11,8 @@ import numpy as np
 from damageest.artefacts import Floats
 from damageest.io.part_store import Arrays, recall
 from damageest.stages.align.search.pairs import PairTable
-from damageest.stages.align.surface.planes import PartSurface, PlaneGrid
-from damageest.stages.align.surface.points import OrientedPoints, orient_surface
+from damageest.stages.align.surface.oriented_points import OrientedPoints, orient_surface
+from damageest.stages.align.surface.plane_grid import PartSurface, PlaneGrid
 from damageest.stages.align.symmetry.symmetries import find_symmetries, is_mirrored_onto_itself
 
 MOST_KEPT = 200_000

@@ -10,11 +10,11 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.transforms import move_points
-from damageest.stages.align.refine.fit import fit
+from damageest.stages.align.refine.robust_fit import fit
 from damageest.stages.align.search.pairs import PairTable, propose_poses
 from damageest.stages.align.search.search import search
-from damageest.stages.align.surface.planes import PartSurface, PlaneGrid
-from damageest.stages.align.surface.points import orient_surface
+from damageest.stages.align.surface.oriented_points import orient_surface
+from damageest.stages.align.surface.plane_grid import PartSurface, PlaneGrid
 
 EXACT = 1e-4
 """Distance, in diagonals, up to which a motion has to put all of the part's surface onto the part."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.stages.align.refine.check_pose import PoseCheck, check_pose
-from damageest.stages.align.refine.fit import Fit
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.refine.robust_fit import Fit
+from damageest.stages.align.surface.plane_grid import PartSurface
 from damageest.stages.align.wear.one_sided import measure_bands
-from damageest.stages.align.wear.patches import Patches, measure_patches
+from damageest.stages.align.wear.skin_patches import Patches, measure_patches
 
 MOST_OUTSIDE = 0.04
 """Share of the skin that may lie outside by less than `LOW`, where wear explains a scan."""

@@ -9,15 +9,15 @@ import numpy as np
 from damageest.artefacts import DatumFit, Flags, Floats, FreeMotion, Reason
 from damageest.errors import StageError
 from damageest.geometry.transforms import make_motions
-from damageest.stages.align.refine.fit import Fit
+from damageest.stages.align.refine.robust_fit import Fit
 from damageest.stages.align.surface.frame import Frame
 from damageest.stages.align.wear.check_worn import MOST_OUTSIDE, measure_outside, measure_wear
 from damageest.stages.align.wear.datum_skin import DatumSkin
-from damageest.stages.align.wear.explain import explain
+from damageest.stages.align.wear.explained import explain
 from damageest.stages.align.wear.free import MIN_MOVED as APART
 from damageest.stages.align.wear.free import find_freedoms
 from damageest.stages.align.wear.one_sided import Proposals, measure_bands, propose_motions, search_motions
-from damageest.stages.align.wear.patches import Patches, measure_patches
+from damageest.stages.align.wear.skin_patches import Patches, measure_patches
 from damageest.stages.align.wear.words import describe_open, to_free_motion
 
 FORM_ERRORS = (0.03, 0.06, 0.12, 0.25)

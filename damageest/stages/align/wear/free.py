@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest.stages.align.wear.one_sided import OUTSIDE, measure_movement
-from damageest.stages.align.wear.patches import Patches
+from damageest.stages.align.wear.skin_patches import Patches
 
 MIN_GAIN = 0.5
 """Contact that another pose has to gain, as a share of that which it loses, to explain the scan as well."""

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats
 from damageest.geometry.threads import cut_evenly
-from damageest.stages.align.wear.patches import Patches
+from damageest.stages.align.wear.skin_patches import Patches
 
 REACH = 3.0
 """Standard deviations of a patch's mean up to which it is in contact with the skin."""

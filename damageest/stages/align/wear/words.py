@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, FreeMotion, Vector
 from damageest.stages.align.surface.frame import Frame
-from damageest.stages.align.wear.patches import Patches
+from damageest.stages.align.wear.skin_patches import Patches
 
 ARM = 0.3
 """Distance from the axis of a turn, in diagonals, of skin that it moves."""

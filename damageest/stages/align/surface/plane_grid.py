@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Flags, Floats, Ints, Mesh
 from damageest.geometry.distance import SurfaceTree, keep_tree
-from damageest.stages.align.surface.points import OrientedPoints
+from damageest.stages.align.surface.oriented_points import OrientedPoints
 
 Floats32 = NDArray[np.float32]
 

@@ -8,7 +8,7 @@ from damageest.artefacts import Floats, Ints
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_cubes, number_faced_cubes
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 POINTS = 8000
 """Number of scan points that two poses are compared with."""

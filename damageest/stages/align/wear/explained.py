@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.stages.align.wear.patches import Patches
+from damageest.stages.align.wear.skin_patches import Patches
 
 LEAST_DEPTH = 0.3
 """Least mean depth of wear, in tolerances: shallower wear cannot be told from errors."""

@@ -10,7 +10,7 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.duplicates import group_integers
 from damageest.geometry.transforms import move_points
 from damageest.geometry.voxels import number_faced_cubes
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 EDGE = 4.0
 """Edge of a patch, in mean distances between points: about sixteen points on a face."""

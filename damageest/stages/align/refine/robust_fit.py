@@ -9,7 +9,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.transforms import make_motions, move_points
-from damageest.stages.align.surface.planes import PartSurface
+from damageest.stages.align.surface.plane_grid import PartSurface
 
 REACH = 3.5
 """Half-width of the kernel, in standard deviations of the points' distances to the surface."""
