@@ -142,7 +142,12 @@ def test_functions_take_few_values() -> None:
     assert crowded == THIRD_PARTIES | LEFT
 
 
-LISTED = ("artefacts", "batches", "checks", "inspection", "io", "isolation", "job", "registry")
+ROOMS = sorted(
+    path.parent.relative_to(ROOT / "damageest").as_posix()
+    for folder in ("checks", "pipeline", "stages/align")
+    for path in (ROOT / "damageest" / folder).glob("*/__init__.py")
+)
+LISTED = ("artefacts", "batches", "checks", "inspection", "io", "isolation", "job", "registry", *ROOMS)
 """Folders whose ``__init__.py`` names every module, so that a reader who looks for one finds it."""
 
 
@@ -170,3 +175,14 @@ def test_architecture_names_no_module_that_is_not_there() -> None:
     named = {Path(name).name for name in re.findall(r"`([\w/]+\.py)`", text)}
     assert named
     assert not named - there
+
+
+def test_a_question_is_answered_in_two_steps() -> None:
+    """ARCHITECTURE.md names the room, and the room's `__init__.py` its files or its contract."""
+    text = (ROOT / "ARCHITECTURE.md").read_text()
+    (answers,) = re.findall(r"^Where is it\?.*?(?=\n\n)", text, re.MULTILINE | re.DOTALL)
+    named = re.findall(r"`((?:\w+/)+)`", answers)
+    assert len(named) >= 9
+    for room in named:
+        place = next(base / room for base in (ROOT / "damageest", ROOT) if (base / room).is_dir())
+        assert len((place / "__init__.py").read_text().splitlines()) > 3
