@@ -9,9 +9,9 @@ from damageest_benchmarks.parts import PARTS
 import damageest
 from damageest.artefacts import Part, Scan
 from damageest.result import Result
-from damageest.stages.report._least_depth import map_least_depth
 from damageest.stages.report._values import list_sensor
 from damageest.stages.report._words import ENGLISH_WORDS
+from damageest.stages.report.scene._least_depth import map_least_depth
 from damageest.stages.scan.simulate import Simulate
 
 UNIT = PARTS["ribbed_plate"]().diagonal / 250

@@ -18,12 +18,12 @@ from damageest.io.files import embed_png, file_sha256
 from damageest.result import Result
 from damageest.rules.notes import merge_notes, qualify_nothing
 from damageest.stages.report import _style as style
-from damageest.stages.report._scene import EXAGGERATED, LAYERS, Scene
 from damageest.stages.report._section import draw_histogram
 from damageest.stages.report._sections import draw_sections, group_sections
 from damageest.stages.report._sites import MOST_DRAWN, Shown
 from damageest.stages.report._values import list_fit, list_freedom, list_sensor, show_total_interval
 from damageest.stages.report._words import ENGLISH_WORDS, N_, Words
+from damageest.stages.report.scene.scene import EXAGGERATED, LAYERS, Scene
 
 FOLDER = Path(__file__).parent / "page"
 DEFINE = "window.define = (name, needs, make) => { window.k3d = make(); };"

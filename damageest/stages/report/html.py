@@ -67,9 +67,9 @@ class Html(Report):
     def run(self, result: Result, folder: Path, content: Mapping[str, Any], job_text: str) -> ReportFiles:
         """Writes ``report.html``, and ``report.pdf`` where the job wants it, into ``folder``."""
         from damageest.stages.report._page import fill_page
-        from damageest.stages.report._scene import build_scene
         from damageest.stages.report._sites import Remains, choose_overview, describe_sites
         from damageest.stages.report._words import Words
+        from damageest.stages.report.scene.scene import build_scene
 
         words = Words(self.language)
         scene, remains = build_scene(result, self.points, self.triangles), Remains(result)
@@ -79,8 +79,8 @@ class Html(Report):
         (folder / "report.html").write_text(page, encoding="utf-8")
         files = ["report.html"]
         if self.pdf:
-            from damageest.stages.report._pdf import write_pdf
-            from damageest.stages.report._pdf_book import Book, Letterhead
+            from damageest.stages.report.pdf.book import Book, Letterhead
+            from damageest.stages.report.pdf.document import write_pdf
 
             book = Book(result, content, job_text, words, Letterhead(self.company, self.logo))
             write_pdf(folder / "report.pdf", book, sites, remains, start)

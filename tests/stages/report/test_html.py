@@ -186,7 +186,7 @@ def test_a_report_that_fails_is_a_warning(small_done: Path, monkeypatch: pytest.
     def fail(*_: object) -> None:
         raise ValueError("no such colour")
 
-    monkeypatch.setattr("damageest.stages.report._scene.build_scene", fail)
+    monkeypatch.setattr("damageest.stages.report.scene.scene.build_scene", fail)
     result = damageest.run(small_done, output=True, settings=["report=html"])
     written = small_done.parent / "out/job/result.json"
     assert [note for note in result.warnings if note.code == "report" and "no such colour" in note.text]

@@ -10,8 +10,8 @@ from typing import Any
 
 from damageest.findings import Interval
 from damageest.result import Result
-from damageest.stages.report._pdf_parts import clean
 from damageest.stages.report._words import Words
+from damageest.stages.report.pdf.page_parts import clean
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from damageest.geometry.tools import place_tool
 from damageest.io import colours
 from damageest.result import Site
 from damageest.stages.report import _style as style
-from damageest.stages.report._scene_stage import Stage
+from damageest.stages.report.scene.scene_stage import Stage
 
 
 def add_path(stage: Stage, site: Site) -> None:

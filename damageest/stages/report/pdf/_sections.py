@@ -8,9 +8,9 @@ from reportlab.platypus import Spacer, Table
 
 from damageest.artefacts import Section
 from damageest.io.section_files import lay_out
-from damageest.stages.report._pdf_book import Book, clean_line
-from damageest.stages.report._pdf_parts import SOFT, WIDTH, Plot, grid_table, head, write
 from damageest.stages.report._sections import choose_decimals, collect_groups, name_quantity
+from damageest.stages.report.pdf.book import Book, clean_line
+from damageest.stages.report.pdf.page_parts import SOFT, WIDTH, Plot, grid_table, head, write
 
 
 def show_sections(book: Book) -> list[Any]:

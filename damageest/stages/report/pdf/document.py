@@ -22,9 +22,13 @@ from damageest.result import Result, Site
 from damageest.rules.notes import merge_notes
 from damageest.stages.report._drawing import draw
 from damageest.stages.report._page import choose_tone, list_volumes
-from damageest.stages.report._pdf_book import Book, clean_line
-from damageest.stages.report._pdf_budget import show_budget
-from damageest.stages.report._pdf_parts import (
+from damageest.stages.report._section import lay_out_site
+from damageest.stages.report._sites import Remains, Shown
+from damageest.stages.report._thin import thin_mesh
+from damageest.stages.report.pdf._budget import show_budget
+from damageest.stages.report.pdf._sections import show_sections
+from damageest.stages.report.pdf.book import Book, clean_line
+from damageest.stages.report.pdf.page_parts import (
     FOOT,
     HEAD,
     LEVELS,
@@ -42,10 +46,6 @@ from damageest.stages.report._pdf_parts import (
     style,
     write,
 )
-from damageest.stages.report._pdf_sections import show_sections
-from damageest.stages.report._section import lay_out_site
-from damageest.stages.report._sites import Remains, Shown
-from damageest.stages.report._thin import thin_mesh
 
 MOST_ROWS = 12
 """Sites in the summary; all have a page."""

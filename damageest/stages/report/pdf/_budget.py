@@ -8,8 +8,8 @@ from typing import Any
 from reportlab.platypus import KeepTogether
 
 from damageest.findings import Budget
-from damageest.stages.report._pdf_book import Book
-from damageest.stages.report._pdf_parts import SOFT, WIDTH, grid_table, head, write
+from damageest.stages.report.pdf.book import Book
+from damageest.stages.report.pdf.page_parts import SOFT, WIDTH, grid_table, head, write
 
 
 def show_budget(book: Book, budget: Budget, name: str, unit: str) -> list[Any]:

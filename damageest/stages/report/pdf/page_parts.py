@@ -1,4 +1,4 @@
-"""Parts of the PDF: styles, tables, drawings, numbered pages. Only it and `_pdf.py` import reportlab."""
+"""Parts of the PDF: styles, tables, drawings, numbered pages. Only it and `document.py` import reportlab."""
 
 from __future__ import annotations
 

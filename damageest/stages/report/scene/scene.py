@@ -13,12 +13,12 @@ from damageest.io import colours
 from damageest.io.section_files import round_nice
 from damageest.result import Result, Site
 from damageest.stages.report import _style as style
-from damageest.stages.report._least_depth import map_least_depth
-from damageest.stages.report._scene_path import add_path
-from damageest.stages.report._scene_stage import Stage
 from damageest.stages.report._thin import find_sharp_edges, thin_mesh, thin_points
 from damageest.stages.report._values import choose_least_ends
 from damageest.stages.report._words import N_
+from damageest.stages.report.scene._least_depth import map_least_depth
+from damageest.stages.report.scene._path import add_path
+from damageest.stages.report.scene.scene_stage import Stage
 
 LAYERS = {
     "part": (N_("Part"), True),
