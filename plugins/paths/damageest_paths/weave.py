@@ -165,7 +165,8 @@ def _list_levels(inner: Any, bead: Bead) -> tuple[list[Floats], list[Line]]:
     while not inner.is_empty():
         rings += read_rings(inner, bead)
         shrunk = shift_border(inner, -step)
-        inner = _drop_narrow(shrunk, SOFT / 2 * bead.width)
+        # each of the shifts triples the corners of a smooth border
+        inner = _drop_narrow(shrunk, SOFT / 2 * bead.width).simplify(INSIDE / 2 * bead.width)
         if inner.is_empty() and not shrunk.is_empty():
             middles = [line for piece in list_pieces(shrunk) for line in _draw_middle(piece, bead)]
     return rings, middles
