@@ -10,6 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.solids import to_arrays
+from damageest_paths.clearance import Clearance
 from damageest_paths.fill import list_lines
 from damageest_paths.floor import Floor, list_floors
 from damageest_paths.follow import follow_line, limit_tilt, make_pass
@@ -19,7 +20,8 @@ from damageest_paths.order import order_passes
 from damageest_paths.patches import Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
 from damageest_paths.process import Pass, Plan, Process, extend_line
-from damageest_paths.regions import cover, measure_length, resample
+from damageest_paths.regions import cover, measure_length, resample, shift_border
+from damageest_paths.shade import measure_shade
 from damageest_paths.sheets import (
     FINE,
     Grid,
@@ -46,6 +48,12 @@ SPARE = 0.02
 """Share of a layer's height that is not worth another layer: the facets of a round floor are off by as much."""
 THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
+
+
+RAGGED, EVEN = 0.25, 0.01
+"""Bead widths within which the border of what is filled is smoothed, and within which that is simplified."""
+SCRAP = 1.5
+"""Bead widths of a pass that are not worth a start beside a longer one."""
 
 
 class Layer(NamedTuple):
@@ -119,6 +127,17 @@ def _refuse(frame: Frame, local: Any, height: float, error: NotFollowedError) ->
     return Plan(frame, height, (), local, {str(error): float(local.volume())})
 
 
+def _smooth(region: Any, width: float) -> Any:
+    """A region without what is ragged along its border, as on a scanned floor, where it would give beads of no worth."""
+    grown = shift_border(shift_border(region, RAGGED * width), -2 * RAGGED * width)
+    return shift_border(grown, RAGGED * width).simplify(EVEN * width)
+
+
+def _open(region: Any, width: float) -> Any:
+    """A region without what is narrow of it."""
+    return shift_border(shift_border(region, -2 * RAGGED * width), 2 * RAGGED * width).simplify(EVEN * width)
+
+
 @dataclass(eq=False)
 class _Work:
     """What is planned of a body. ``near``: the metal round it; ``corners`` (2,3) of its box. ``torn``: share of the
@@ -164,13 +183,14 @@ class _Work:
             some = np.flatnonzero(reach < width)
             held = measure_support(sheet, some, self.near, lines, width / 2, self.height, lean - 3 * FINE * width)
             self.stack.append((sheet, reach))
-            top = self._gather_top()
-            meshes = [top] if len(top.faces) else []
-            above = Obstacles(meshes, self.corners[0], self.corners[1], width, coarser=COARSER)
-            around = [self.standing, Sweeps(self.standing.clearance.with_obstacles(above))]
+            around = [self.standing, self._place_top(self.stack, self.standing.clearance.without_beam())]
+            if number:
+                # beads of the same layer lie beside the beam; where their border rises, it would stand in it
+                around.append(self._place_top(self.stack[:-1], self.standing.clearance))
             self.layer = []
+            shade = measure_shade(sheet, reach, self.near, self.height, self.process)
             for patch in patches:
-                self._fill_patch(patch, number, reach, held - lean, around)
+                self._fill_patch(patch, number, reach, held - lean, shade, around)
             before = self.passes[-1] if self.passes else None
             self.passes += order_passes(self.layer, before, self.standing.clearance, self.process)
             self._require_enough(most_lost)
@@ -195,30 +215,48 @@ class _Work:
             found.append(Layer(sheet, reach, unrolling.patches))
         return found
 
-    def _gather_top(self) -> Mesh:
-        """The sheets of all layers as a mesh, as far as beads lie under them and no other layer on them."""
+    def _place_top(self, stack: Sequence[tuple[Sheet, Floats]], clearance: Clearance) -> Sweeps:
+        """The distances to the sheets of a stack of layers."""
+        top = self._gather_top(stack)
+        meshes = [top] if len(top.faces) else []
+        above = Obstacles(meshes, self.corners[0], self.corners[1], self.process.bead.width, coarser=COARSER)
+        return Sweeps(clearance.with_obstacles(above))
+
+    def _gather_top(self, stack: Sequence[tuple[Sheet, Floats]]) -> Mesh:
+        """The sheets of these layers as a mesh, as far as beads lie under them and no other layer on them."""
         half = self.process.bead.width / 2
         vertices, faces = [], []
-        for k, (sheet, reach) in enumerate(self.stack):
+        for k, (sheet, reach) in enumerate(stack):
             shown: Flags = sheet.is_found & (reach < half)
             coarse = self.grid.coarse
             own = coarse[shown[coarse].any(axis=1) & sheet.is_found[coarse].all(axis=1)]
-            if k + 1 < len(self.stack):
-                own = own[(self.stack[k + 1][1][own] > -2 * half).any(axis=1)]
+            if k + 1 < len(stack):
+                own = own[(stack[k + 1][1][own] > -2 * half).any(axis=1)]
             vertices.append(sheet.points)
             faces.append(own + k * len(reach))
         used, number = np.unique(np.concatenate(faces), return_inverse=True)
         return Mesh(np.concatenate(vertices)[used], number.reshape(-1, 3))
 
-    def _fill_patch(self, patch: Patch, layer: int, reach: Floats, support: Floats, around: Sequence[Sweeps]) -> None:
+    def _fill_patch(
+        self,
+        patch: Patch,
+        layer: int,
+        reach: Floats,
+        support: Floats,
+        shade: Floats | None,
+        around: Sequence[Sweeps],
+    ) -> None:
         process = self.process
         wanted = patch.draw_region(reach, process)
         held = wanted ^ patch.draw_region(support, process)
         angle = process.angle + layer * process.turn
         style = process.choose_style(layer)
-        lines = list_lines(held, process.pattern, process.bead, angle, None, process.shortest, None, style)
-        long = [line for line in lines if measure_length(line.points) >= process.shortest]
-        short = [line.points for line in lines if measure_length(line.points) < process.shortest]
+        free = None if shade is None else _open(patch.draw_region(shade, process), process.bead.width)
+        lines = list_lines(_smooth(held, process.bead.width), process.pattern, process.bead, angle, free, process.shortest, None, style)
+        longest = max((measure_length(line.points) for line in lines), default=0.0)
+        least = max([process.shortest, *([SCRAP * process.bead.width] if longest > SCRAP * process.bead.width else [])])
+        long = [line for line in lines if measure_length(line.points) >= least]
+        short = [line.points for line in lines if measure_length(line.points) < least]
         done: list[Floats] = []
         dropped: dict[str, list[Floats]] = {COLLIDES: [], SHADED: [], SHORT: short}
         for line in long:

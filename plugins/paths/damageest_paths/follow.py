@@ -11,6 +11,7 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.gauges import Gauge, LeastGauge
 from damageest_paths.process import Pass, Process, measure_along
+from damageest_paths.steady import steady_axes
 from damageest_paths.sweeps import Sweeps
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -84,7 +85,8 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     taken so often that between two places nothing comes nearer by more than half of the process's step. ``least``:
     number of points of a run.
     """
-    ways, around = list_ways(normals, process), LeastGauge(parts)
+    smooth = steady_axes(points, normals, process.turn_rate, process.bead.width)
+    ways, around = list_ways(smooth, process), LeastGauge(parts)
     tried = [_measure(points, ways[0], normals, around, process, np.ones(len(points) - 1, bool))]
     if not (tried[0].gaps >= process.gap).all() and len(ways) > 1:
         for k, chosen in _choose_ways(points, normals, ways, parts, process):
@@ -92,6 +94,9 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
             if (tried[-1].gaps >= process.gap).all():
                 tried = tried[-1:]
                 break
+        else:
+            mixed = _mix(points, [one.axes for one in tried], np.array([one.gaps >= process.gap for one in tried]), process)
+            tried.append(_measure(points, mixed, normals, around, process, np.ones(len(points) - 1, bool)))
     runs = _cut(np.array([one.gaps >= process.gap for one in tried]), max(least - 1, 1))
     found = []
     for number, start, stop in runs:
@@ -101,6 +106,20 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
             Run(start, stop + 1, one.axes[start : stop + 1], float(one.gaps[low]), (one.poses[low], one.turned[low]))
         )
     return found
+
+
+def _mix(points: Floats, ways: Sequence[Floats], free: Flags, process: Process) -> Floats:
+    """Axes (N,3) that are those of the first way but where it is not free: there, and a little before and after, those
+    of the free way that leans least from it. ``free``: (ways, stretches)."""
+    from scipy.ndimage import maximum_filter1d
+
+    lean = np.array([1 - np.einsum("ij,ij->i", way, ways[0]).mean() for way in ways])
+    order = np.argsort(lean, kind="stable")
+    rank = np.where(free[order].any(axis=0), np.argmax(free[order], axis=0), 0)
+    wide = 2 * int(np.ceil(process.bead.width / process.step)) + 1
+    own = order[maximum_filter1d(rank, wide)]
+    axes = np.array(ways)[np.append(own, own[-1]), np.arange(len(points))]
+    return limit_tilt(steady_axes(points, axes, process.turn_rate, process.bead.width), process.tilt)
 
 
 def _choose_ways(

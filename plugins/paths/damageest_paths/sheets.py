@@ -129,7 +129,7 @@ def lay_sheet(floor: Floor, grid: Grid, below: Sheet, depth: float, process: Pro
         distance, upward[far] = floor.measure(points[far])
         off[far] = depth - distance
     is_found = (np.abs(off) < 0.02 * spacing) & (upward[:, 2] > STEEP)
-    rounds = int(np.clip(np.ceil((process.bead.width / 2 / grid.edge) ** 2), 1, 100))
+    rounds = int(np.clip(np.ceil((1.5 * process.bead.width / grid.edge) ** 2), 1, 300))
     return Sheet(depth, points, upward, _smooth(upward, is_found, grid.shape, rounds), is_found)
 
 
