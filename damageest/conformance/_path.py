@@ -23,7 +23,7 @@ class PathContract(StageContract):
     def make_scene(self) -> dict[str, Any]:
         part, bite = Part(*make_block((0, 0, 0), SIZE)), Solid(*make_block((3, 1, 1), (4, 2, 2)))
         left = to_solid(to_manifold(part) - to_manifold(bite))
-        return {"body": bite, "part": part, "left": left, "built": None, "tolerance": 0.01}
+        return {"body": bite, "part": part, "left": left, "built": None, "tolerance": 0.01, "reach": None}
 
     def run_path(self, **changes: Any) -> DepositPath:
         """The path, with some inputs replaced by ``changes``. Skips the check where there is none."""

@@ -16,6 +16,7 @@ from damageest.isolation.lost_threads import raise_lost
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.calls import call_guarded, run_stage
+from damageest.pipeline.reach import find_reach
 from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Candidate, FoundSite, JobState, list_given
 from damageest.pipeline.steps import GATHERED, Step
@@ -264,6 +265,7 @@ def start(engine: Engine) -> JobState:
     state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
     state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
     state = state.with_value(JobState.conversions, registry.conversions, digest(sorted(registry.conversions)))
+    state = state.with_value(JobState.reach, find_reach(job, registry))
     for name in ("samples", "nearby"):  # until an implementation takes them
         state = state.with_named(name, None, digest(None))
     for name in ("candidates", "found", "failures", "warnings"):

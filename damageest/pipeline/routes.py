@@ -144,7 +144,7 @@ CLOSE: Route = (
     review_model_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
-    plan_paths,  # calls Path: found, part, tolerance -> found, +failures
+    plan_paths,  # calls Path: found, part, tolerance, reach -> found, +failures
     sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, scanner_errors, unit
     #     -> volume_95, budget
     cut_sections,  # asked_sections, field, adapted, pose_error, sensor, unit -> sections, +warnings

@@ -219,8 +219,9 @@ class JobState(State):
 
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
     ``accept``, ``asked_sections``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose
-    options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers`` and
-    ``conversions``. ``tolerance``: None until it is measured where the job says `auto`. ``measured_noise`` and
+    options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers``,
+    ``reach`` (see the stage `path`) and ``conversions``. ``tolerance``: None until it is measured where the job says
+    `auto`. ``measured_noise`` and
     ``measured_spacing``: of the scan before it is aligned; ``depth_step``: of its depth, 0 where it is continuous.
     ``refusal``: why `align` gave no pose in the tolerance, where the pose is one in a larger. ``aligned``: the scan in
     the part's frame. ``adapted``: the part deformed to follow the scan, which is ``part`` from then on; None: it is as
@@ -253,6 +254,7 @@ class JobState(State):
     encloser_at_once = Value[EncloseAll | None]()
     rules = Value[tuple[Rule, ...]]()
     writers = Value[Mapping[str, Writer]]()
+    reach = Value[Floats | None]()
     path_writers = Value[Mapping[str, PathWriter]]()
     conversions = Value[Mapping[str, Conversion]]()
 

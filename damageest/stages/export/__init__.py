@@ -192,11 +192,12 @@ class PathWriter:
     asked for to it), and a `PathSettings`; the same path gives the same bytes. It gives notes, which the run prints at
     its end, or None, and raises StageError for a path that the format cannot hold or the machine cannot run: then there
     is no file. ``suffix``: of the file, without the dot. ``check``: called before anything is computed; None for
-    none."""
+    none. ``reach``: gives the tool axes that the machine reaches, see the stage `path`; None for all."""
 
     write: Callable[[Path, DepositPath, PathSettings], Sequence[str] | None]
     suffix: str
     check: CheckFunction | None = None
+    reach: Callable[[PathSettings], Floats | None] | None = None
 
 
 def describe_setup(path: DepositPath, factor: float = 1.0) -> list[str]:
@@ -245,6 +246,10 @@ class Export(Stage, ABC):
 
     stage: ClassVar[str] = "export"
     gives: ClassVar[str] = "written"
+
+    def find_reach(self, path_writers: Mapping[str, PathWriter]) -> Floats | None:
+        """The tool axes that the machine of the paths reaches, see the stage `path`; None for all."""
+        return None
 
     @asked_by_name
     @abstractmethod

@@ -114,6 +114,14 @@ class Files(Export):
         templates = {"path_header": self.path_header, "path_footer": self.path_footer}
         return check_paths(self.paths, settings, templates, job.get("path"), registry.path_writers)
 
+    def find_reach(self, path_writers: Mapping[str, PathWriter]) -> Floats | None:
+        """That of the first format of the paths that knows its machine, where paths are in the part's frame alone."""
+        if self.machine is None or any(place == SCAN for place in PLACES[self.frame]):
+            return None
+        told = PathSettings("mm", "", options=self.path_options, machine=self.machine)
+        known = [path_writers[name].reach for name in self.paths if name in path_writers]
+        return next((reach(told) for reach in known if reach is not None), None)
+
     def run(
         self,
         result: Result,

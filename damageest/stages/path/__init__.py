@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from typing import ClassVar
 
-from damageest.artefacts import DepositPath, Part, Solid
+from damageest.artefacts import DepositPath, Floats, Part, Solid
 from damageest.stages import Stage, asked_by_name
 
 
@@ -18,6 +18,8 @@ class Path(Stage, ABC):
         left: the part without the cavities of all sites; None where nothing is left.
         built: the deposits of the sites that are built up before this one, as one solid; None for the first.
         tolerance: the job's tolerance.
+        reach: the tool axes that the machine of the stage `export` reaches, (5,): a unit vector, and the least and
+            largest cosine of their angle with it; None for all, or where the job names no machine.
 
     Returns:
         None where no path is wanted. Else a `DepositPath`, whose passes do not touch ``left`` and ``built`` with the
@@ -64,7 +66,13 @@ class Path(Stage, ABC):
     @asked_by_name
     @abstractmethod
     def run(
-        self, body: Solid, part: Part, left: Solid | None, built: Solid | None, tolerance: float
+        self,
+        body: Solid,
+        part: Part,
+        left: Solid | None,
+        built: Solid | None,
+        tolerance: float,
+        reach: Floats | None,
     ) -> DepositPath | None: ...
 
     def list_channels(self) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from damageest.stages.export import PathSettings, PathWriter
 
 if TYPE_CHECKING:
-    from damageest.artefacts import DepositPath
+    from damageest.artefacts import DepositPath, Floats
 
 DIALECTS = {
     "krl": ("krl", "Krl", "src"),
@@ -27,10 +27,17 @@ DIALECTS = {
 def list_writers() -> Mapping[str, PathWriter]:
     """One for each dialect, and json."""
     writers = {
-        name: PathWriter(partial(_write, module, cls), suffix, partial(_check, module, cls))
+        name: PathWriter(partial(_write, module, cls), suffix, partial(_check, module, cls), _find_reach)
         for name, (module, cls, suffix) in DIALECTS.items()
     }
-    return writers | {"json": PathWriter(_write_json, "json", _check_json)}
+    return writers | {"json": PathWriter(_write_json, "json", _check_json, _find_reach)}
+
+
+def _find_reach(settings: PathSettings) -> Floats | None:
+    from damageest_machines.files import find_file, read_machine
+    from damageest_machines.reach import find_reach
+
+    return None if settings.machine is None else find_reach(read_machine(find_file(settings.machine)))
 
 
 def _check(module: str, cls: str, settings: PathSettings, channels: Sequence[str]) -> None:

@@ -143,11 +143,15 @@ def slerp(first: Floats, last: Floats, share: Floats) -> Floats:
     return normalise(found)
 
 
+def find_order(axes: Sequence[Rotary]) -> list[int]:
+    """The numbers of two axes, from the part to the bed, and on to the tool."""
+    part = [k for k in (0, 1) if axes[k].carries == "part"]
+    return [*part[::-1], *(k for k in (0, 1) if axes[k].carries == "tool")]
+
+
 def _make_chain(axes: Sequence[Rotary]) -> _Chain:
     u = [np.array(axis.direction) / np.linalg.norm(axis.direction) for axis in axes]
-    part = [k for k in (0, 1) if axes[k].carries == "part"]
-    tool = [k for k in (0, 1) if axes[k].carries == "tool"]
-    order = [*part[::-1], *tool]  # from the part to the bed, and on to the tool
+    order = find_order(axes)
     signs = [-1.0 if axes[k].carries == "part" else 1.0 for k in order]
     return _Chain(u[order[0]], u[order[1]], (signs[0], signs[1]), (order[0], order[1]))
 

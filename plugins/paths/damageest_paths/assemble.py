@@ -62,7 +62,8 @@ def plan_moves(draft: Draft, speeds: Speeds) -> DepositPath:
         free_ends=moves.free_ends,
         layer_form=draft.layer_form,
     )  # fmt: skip
-    return _add_notes(path, moves, process)
+    noted = _add_notes(path, moves, process)
+    return replace(noted, notes=(*noted.notes, draft.why)) if draft.why else noted
 
 
 def _choose_setup(direction: Floats) -> Floats:

@@ -20,8 +20,9 @@ from damageest_paths.order import order_passes
 from damageest_paths.patches import Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
 from damageest_paths.process import Pass, Plan, Process, extend_line
-from damageest_paths.regions import cover, measure_length, resample, shift_border
-from damageest_paths.shade import measure_shade
+from damageest_paths.reach import turn_reach
+from damageest_paths.regions import cover, measure_length, resample
+from damageest_paths.shade import drop_narrow, measure_shade, smooth_border
 from damageest_paths.sheets import (
     FINE,
     Grid,
@@ -50,8 +51,6 @@ THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
 
 
-RAGGED, EVEN = 0.25, 0.01
-"""Bead widths within which the border of what is filled is smoothed, and within which that is simplified."""
 SCRAP = 1.5
 """Bead widths of a pass that are not worth a start beside a longer one."""
 
@@ -86,6 +85,9 @@ def plan_conformal(
     ``find_other``: is asked once layers are laid out, before beads are, for a plan that leaves less than the volume
     that no layer covers; that is taken then.
     """
+    process = replace(process, reach=turn_reach(process.reach, frame))
+    if not isinstance(process.starts, str):
+        process = replace(process, starts=frame.to_local(process.starts))
     local, metal = frame.move(body), frame.move(around.metal)
     corners = np.array([local.bounding_box()[:3], local.bounding_box()[3:]])
     plan = Plan(frame, process.height, (), local, {NO_FLOOR: float(local.volume())})
@@ -125,17 +127,6 @@ def plan_conformal(
 
 def _refuse(frame: Frame, local: Any, height: float, error: NotFollowedError) -> Plan:
     return Plan(frame, height, (), local, {str(error): float(local.volume())})
-
-
-def _smooth(region: Any, width: float) -> Any:
-    """A region without what is ragged along its border, as on a scanned floor, where it would give beads of no worth."""
-    grown = shift_border(shift_border(region, RAGGED * width), -2 * RAGGED * width)
-    return shift_border(grown, RAGGED * width).simplify(EVEN * width)
-
-
-def _open(region: Any, width: float) -> Any:
-    """A region without what is narrow of it."""
-    return shift_border(shift_border(region, -2 * RAGGED * width), 2 * RAGGED * width).simplify(EVEN * width)
 
 
 @dataclass(eq=False)
@@ -251,10 +242,21 @@ class _Work:
         held = wanted ^ patch.draw_region(support, process)
         angle = process.angle + layer * process.turn
         style = process.choose_style(layer)
-        free = None if shade is None else _open(patch.draw_region(shade, process), process.bead.width)
-        lines = list_lines(_smooth(held, process.bead.width), process.pattern, process.bead, angle, free, process.shortest, None, style)
-        longest = max((measure_length(line.points) for line in lines), default=0.0)
-        least = max([process.shortest, *([SCRAP * process.bead.width] if longest > SCRAP * process.bead.width else [])])
+        if not isinstance(process.starts, str):
+            style = style._replace(start=patch.find_direction(process.starts))
+        free = None if shade is None else drop_narrow(patch.draw_region(shade, process), process.bead.width)
+        lines = list_lines(
+            smooth_border(held, process.bead.width),
+            process.pattern,
+            process.bead,
+            angle,
+            free,
+            process.shortest,
+            None,
+            style,
+        )
+        scrap, longest = SCRAP * process.bead.width, max((measure_length(line.points) for line in lines), default=0.0)
+        least = max(process.shortest, scrap if longest > scrap else 0.0)
         long = [line for line in lines if measure_length(line.points) >= least]
         short = [line.points for line in lines if measure_length(line.points) < least]
         done: list[Floats] = []

@@ -17,6 +17,7 @@ from damageest_paths.directions import Planner, gather_missing, list_directions,
 from damageest_paths.nozzle import Nozzle
 from damageest_paths.planar import Surroundings
 from damageest_paths.process import Pass, Plan, Process
+from damageest_paths.reach import is_reached
 from damageest_paths.turning import divide_turns
 
 MUCH_SUNK = 0.05
@@ -42,7 +43,7 @@ class Draft:
 
     ``origin`` (3,): that the plans, and what is ``around``, are relative to. ``missing``: what is not filled; ``fill``:
     what the beads do, None where they are not simulated.
-    ``layer_form``: see `DepositPath`.
+    ``layer_form``: see `DepositPath`. ``why``: it was taken, where another was tried.
     """
 
     task: Task
@@ -54,6 +55,7 @@ class Draft:
     missing: Solid | None
     fill: BeadFill | None
     layer_form: str = ""
+    why: str = ""
 
     @property
     def is_empty(self) -> bool:
@@ -97,6 +99,7 @@ def draft_path(
     clearance = Clearance(nozzle, standoff, None, detail, beam=process.beam)
     around = Surroundings(_take_metal(task.left, origin), _shift(task.others, origin), clearance)
     directions = list_directions(task.body, task.left, task.tolerance) if direction is None else [direction]
+    directions = [one for one in directions if is_reached(one[None], process.reach).all()] or directions
     plans = plan_parts(body, origin, directions, around, process, planner)
     groups = [[_to_relative(one, plan) for one in plan.passes] for plan in plans]
     missing = gather_missing(plans)

@@ -11,6 +11,7 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.gauges import Gauge, LeastGauge
 from damageest_paths.process import Pass, Process, measure_along
+from damageest_paths.reach import keep_reached
 from damageest_paths.steady import steady_axes
 from damageest_paths.sweeps import Sweeps
 
@@ -70,7 +71,7 @@ def list_ways(normals: Floats, process: Process) -> list[Floats]:
             turn = 2 * np.pi * k / AROUND
             side = np.cos(turn) * first + np.sin(turn) * second
             ways.append(limit_tilt(np.cos(lean) * normals + np.sin(lean) * side, process.tilt))
-    return ways
+    return [keep_reached(way, process.reach) for way in ways]
 
 
 def _tilt_less(axes: Floats, angle: Floats) -> Floats:
@@ -95,7 +96,9 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
                 tried = tried[-1:]
                 break
         else:
-            mixed = _mix(points, [one.axes for one in tried], np.array([one.gaps >= process.gap for one in tried]), process)
+            mixed = _mix(
+                points, [one.axes for one in tried], np.array([one.gaps >= process.gap for one in tried]), process
+            )
             tried.append(_measure(points, mixed, normals, around, process, np.ones(len(points) - 1, bool)))
     runs = _cut(np.array([one.gaps >= process.gap for one in tried]), max(least - 1, 1))
     found = []
@@ -119,7 +122,8 @@ def _mix(points: Floats, ways: Sequence[Floats], free: Flags, process: Process) 
     wide = 2 * int(np.ceil(process.bead.width / process.step)) + 1
     own = order[maximum_filter1d(rank, wide)]
     axes = np.array(ways)[np.append(own, own[-1]), np.arange(len(points))]
-    return limit_tilt(steady_axes(points, axes, process.turn_rate, process.bead.width), process.tilt)
+    steady = steady_axes(points, axes, process.turn_rate, process.bead.width)
+    return keep_reached(limit_tilt(steady, process.tilt), process.reach)
 
 
 def _choose_ways(

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Literal, Protocol
 
+import numpy as np
+
 from damageest.artefacts import DepositPath
 from damageest_paths.conformal import plan_conformal
 from damageest_paths.directions import Planner
 from damageest_paths.drafts import MUCH_SUNK, Draft
 from damageest_paths.frames import Frame
+from damageest_paths.merit import measure_merit
 from damageest_paths.planar import SHORT, SUNK, Surroundings, plan_planar
 from damageest_paths.process import Plan as LayerPlan
 from damageest_paths.process import Process
@@ -21,6 +24,9 @@ POOR = 0.07
 7 % of themselves to the stair-step of planes beside leaning walls."""
 GAIN = 0.5
 """Share of what planes lose that these may lose."""
+MANY, CHEAPER = 5.0, 0.7
+"""How many times as many layers in planes as along the floor are tried against each other; and the share of the cost of
+planes, see `Merit`, at which those along the floor are taken if they lose no more."""
 FARTHEST = 1.1
 """Bead widths by which beads may reach out of the deposit, or as far as those of planes do."""
 SPARING = (0.4, 0.3)
@@ -45,13 +51,27 @@ def plan_in_form(form: Form, plan: Plan, is_sink_given: bool = False) -> Draft:
     if form == "conformal":
         return replace(plan(PLANNERS[form]), layer_form=form)
     planar = plan(PLANNERS["planar"])
-    if form == "auto" and _measure_steps(planar) > POOR:
+    why = ""
+    is_poor = _measure_steps(planar) > POOR
+    if form == "auto" and (is_poor or _has_many_layers(planar)):
         conformal = replace(plan(PLANNERS["conformal"], along_normal=True), layer_form="conformal")
         spilt = max(FARTHEST * planar.width, _measure_spill(planar))
-        is_better = not conformal.is_empty and measure_lost(conformal) <= GAIN * measure_lost(planar)
-        if is_better and _measure_spill(conformal) <= spilt:
-            return conformal
+        costs = measure_merit(planar), measure_merit(conformal)
+        is_better = is_poor and measure_lost(conformal) <= GAIN * measure_lost(planar)
+        is_better |= costs[1].cost < CHEAPER * costs[0].cost and measure_lost(conformal) <= measure_lost(planar)
+        if not conformal.is_empty:
+            why = f"cost beyond the beads: in planes {costs[0].describe()}, along the floor {costs[1].describe()}"
+        if not conformal.is_empty and is_better and _measure_spill(conformal) <= spilt:
+            return replace(conformal, why=why)
+    planar = replace(planar, why=why)
     return replace(planar if is_sink_given else _spare_metal(planar, plan), layer_form="planar")
+
+
+def _has_many_layers(planar: Draft) -> bool:
+    """Whether a deposit is a thin shell whose planes are many more than layers along its floor would be."""
+    thick = 2 * planar.deposit_volume / planar.task.body.area
+    along = int(np.ceil(thick / planar.process.height))
+    return measure_merit(planar).counts[1] >= MANY * along
 
 
 def _spare_metal(planar: Draft, plan: Plan) -> Draft:

@@ -101,7 +101,8 @@ class Layers(Path):
         "auto",
         description="planar: planes across the build direction; conformal: surfaces at equal height above the floor "
         "of the cavity, up to 75 degrees steep; auto: conformal where planes lose more than 7 % of the deposit and it "
-        "loses at most half of that, else planar",
+        "loses at most half of that, or where a thin shell needs five times as many planes and these cost much more; else "
+        "planar",
     )
     width: Length = Field(description="width of a bead; optional with calibration, like height")
     feed: Length = Field(description="speed of deposition, in lengths a minute; less where a bead is higher")
@@ -230,7 +231,9 @@ class Layers(Path):
         """Sites named in ``sites`` come first, in that order."""
         return self.sites.index(number) if number in self.sites else len(self.sites)
 
-    def run(self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float) -> DepositPath | None:
+    def run(
+        self, body: Solid, left: Solid | None, built: Solid | None, tolerance: float, reach: Floats | None = None
+    ) -> DepositPath | None:
         """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
         from damageest_paths.assemble import Speeds, describe_surplus, plan_moves
         from damageest_paths.directions import Planner, find_open_normal
@@ -266,6 +269,7 @@ class Layers(Path):
             cooling=Cooling(self.interpass, self.feed, fast) if self.interpass else None,
             is_along=self.angle == "auto",
             starts=np.array(self.starts.at) if isinstance(self.starts, StartPlace) else self.starts,
+            reach=reach if self.axes == 5 else None,
         )
         direction: Floats | None = None
         if self.direction == "normal":

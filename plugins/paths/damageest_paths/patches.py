@@ -43,6 +43,12 @@ class Patch:
         inside = faces[~is_outside]
         return make_region([vertices[loop, :2] for loop in _trace_border(inside)]).simplify(process.bead.width / 200)
 
+    def find_direction(self, point: Floats) -> float:
+        """The direction in radians, in the plane, of its place nearest to a point (3,), seen from its middle."""
+        nearest = int(np.argmin(np.linalg.norm(self.tree.points - point, axis=1)))
+        away = self.places[nearest] - self.places.mean(axis=0)
+        return float(np.arctan2(away[1], away[0]))
+
     def fill_below(self, region: Any, drop: float, edge: float) -> Any:
         """What lies up to ``drop`` below a region, as a Manifold in local coordinates with edges up to ``edge``."""
         block = region.extrude(drop).refine_to_length(edge)

@@ -19,6 +19,7 @@ from damageest_paths.frames import Frame
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.process import Pass, Plan, Process, extend_line
+from damageest_paths.reach import is_reached, turn_reach
 from damageest_paths.regions import (
     cover,
     list_pieces,
@@ -62,6 +63,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
     or the layer below is near enough. Passes, or pieces of passes, at which the nozzle comes too near to metal, other
     meshes or the layers below are left out.
     """
+    process = replace(process, reach=turn_reach(process.reach, frame))
     local, metal = frame.move(body), frame.move(around.metal)
     deepest, high = local.bounding_box()[2], local.bounding_box()[5]
     low = find_foot(local, process.bead.width, process.height)
@@ -200,6 +202,8 @@ class _AxisChoice:
         tilt = process.tilt if process.axes == 5 else 0.0
         tilt = min(tilt, process.beam.incidence) if process.beam else tilt
         axes = list_axes(tilt, np.radians(30.0), 6) if process.is_trial else list_axes(tilt)
+        if is_reached(axes[:1], process.reach).all():
+            axes = axes[is_reached(axes, process.reach)]
         # everything up to the top of the layer stays below the nozzle's lowest point
         self.lowest = np.array([_find_lowest(clearance, axis) for axis in axes])
         self.axes = axes[self.lowest >= process.gap * (1 - 1e-9)]

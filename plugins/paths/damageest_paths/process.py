@@ -40,7 +40,7 @@ class Process:
     ``beam``: see `Beam`. ``sink``: how deep a bead may lie in intact metal; None: the share ``sink_share`` of the
     height of a layer. ``cooling``: see `Cooling`; None: beads need not cool down. ``is_along``: long regions have their
     rows along them. ``starts``: of rings, in directions that differ from layer to layer, or do not, or near to a point
-    (3,) of the part.
+    (3,) of the part. ``reach``: of the machine, see the stage `path`, in the part's frame, or in a plan's.
     """
 
     height: float
@@ -63,6 +63,7 @@ class Process:
     cooling: Cooling | None = None
     is_along: bool = True
     starts: Literal["spread", "aligned"] | Floats = "spread"
+    reach: Floats | None = None
 
     def choose_style(self, layer: int, region: Any = None, frame: Frame | None = None) -> Style:
         """How rows and rings of a layer run in a region of a plane across the frame's z; without these, a place near to

@@ -1,6 +1,8 @@
-"""Where on a layer along the floor a wall beside the bead stands in the beam of an upright tool."""
+"""Regions of a layer along the floor: where a wall stands in the beam of an upright tool, and even borders."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -8,6 +10,7 @@ from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
 from damageest_paths.follow import limit_tilt
 from damageest_paths.process import Process
+from damageest_paths.regions import shift_border
 from damageest_paths.sheets import Sheet
 
 HEIGHTS = (0.5, 1.0, 2.0)
@@ -16,6 +19,9 @@ OVER = 1.05
 """The least height, in radii of the beam, above what the layer lies on."""
 ROOM = 1.02
 """Share of the beam's radius that has to be free round its middle: a scanned wall is rough."""
+
+RAGGED, EVEN = 0.25, 0.01
+"""Bead widths within which the border of what is filled is smoothed, and within which that is simplified."""
 
 
 def measure_shade(sheet: Sheet, reach: Floats, metal: Mesh, height: float, process: Process) -> Floats | None:
@@ -37,3 +43,15 @@ def measure_shade(sheet: Sheet, reach: Floats, metal: Mesh, height: float, proce
         least = np.minimum(least, distance_to_mesh(sheet.points[some] + up * upright, metal))
     found[some] = ROOM * radius - least
     return found
+
+
+def smooth_border(region: Any, width: float) -> Any:
+    """A region without what is ragged along its border, as on a scanned floor: that gives beads of no worth. ``width``
+    of a bead."""
+    grown = shift_border(shift_border(region, RAGGED * width), -2 * RAGGED * width)
+    return shift_border(grown, RAGGED * width).simplify(EVEN * width)
+
+
+def drop_narrow(region: Any, width: float) -> Any:
+    """A region without what is narrower than a bead of a ``width``."""
+    return shift_border(shift_border(region, -2 * RAGGED * width), 2 * RAGGED * width).simplify(EVEN * width)

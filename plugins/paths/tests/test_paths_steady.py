@@ -1,0 +1,59 @@
+"""Steady tool axes along a pass, what the machine reaches, and rings of a smooth border."""
+
+from __future__ import annotations
+
+import numpy as np
+from damageest_paths.frames import make_frame
+from damageest_paths.reach import is_reached, keep_reached, turn_reach
+from damageest_paths.regions import make_region
+from damageest_paths.shade import drop_narrow, smooth_border
+from damageest_paths.steady import steady_axes
+from damageest_paths.stripes import Bead
+from damageest_paths.weave import Style, weave_piece
+
+from damageest.geometry.vectors import normalise
+
+HALF = np.array([0.0, 0.0, 1.0, 0.0, 1.0])
+"""A machine that reaches all axes that do not point down."""
+
+
+def test_axes_of_a_rough_floor_are_steadied() -> None:
+    angle = np.linspace(-1.0, 1.0, 400)
+    points = 20 * np.stack([np.sin(angle), np.cos(angle), np.zeros(400)], axis=1)
+    rough = normalise(points + np.random.default_rng(0).normal(0, 3.0, points.shape))
+    rate = np.radians(20.0) / 2.0
+    steady = steady_axes(points, rough, rate, 2.0)
+    length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    assert (np.linalg.norm(np.diff(rough, axis=0), axis=1) > rate * length).any()
+    assert (np.linalg.norm(np.diff(steady, axis=0), axis=1) <= rate * length).all()
+    assert np.degrees(np.arccos(np.einsum("ni,ni->n", steady, points / 20).clip(-1, 1))).max() < 25
+
+
+def test_axes_beyond_the_machine_go_to_the_nearest_that_it_reaches() -> None:
+    axes = normalise(np.array([[1.0, 0.0, -0.1], [0.3, 0.4, 0.5], [0.0, 1.0, 0.0]]))
+    kept = keep_reached(axes, HALF)
+    assert is_reached(axes, HALF).tolist() == [False, True, True]
+    assert is_reached(kept, HALF).all()
+    assert np.allclose(kept[0], [1, 0, 0], atol=1e-6)
+    assert np.array_equal(kept[1:], axes[1:])
+    assert keep_reached(axes, None) is axes
+    frame = make_frame(np.array([1.0, 0.0, 0.0]), np.zeros(3))
+    turned = turn_reach(HALF, frame)
+    assert is_reached(axes @ frame.turn.T, turned).tolist() == [False, True, True]
+
+
+def test_corners_of_a_smooth_border_do_not_multiply_from_ring_to_ring() -> None:
+    angle = np.linspace(0, 2 * np.pi, 700, endpoint=False)
+    wavy = 24 + 0.3 * np.sin(31 * angle)
+    region = make_region([np.stack([wavy * np.cos(angle), 0.5 * wavy * np.sin(angle)], axis=1)])
+    lines = weave_piece(region, "spiral", Bead(2.0, 1.4), 0.0, Style(), None)
+    assert sum(len(line.points) for line in lines) < 3000
+
+
+def test_even_borders_keep_nearly_all_of_a_region() -> None:
+    square = make_region([np.array([[0.0, 0], [20, 0], [20, 10], [0, 10]])])
+    spike = make_region([np.array([[20.0, 5], [24, 5], [24, 5.3], [20, 5.3]])])
+    even = smooth_border(square + spike, 2.0)
+    assert abs(even.area() - 200) < 1.0
+    assert even.bounds()[2] < 20.5
+    assert drop_narrow(square + spike, 2.0).bounds()[2] < 20.5
