@@ -101,8 +101,8 @@ class Layers(Path):
         "auto",
         description="planar: planes across the build direction; conformal: surfaces at equal height above the floor "
         "of the cavity, up to 75 degrees steep; auto: conformal where planes lose more than 7 % of the deposit and it "
-        "loses at most half of that, or where a thin shell needs five times as many planes and these cost much more; else "
-        "planar",
+        "loses at most half of that, or where a thin shell needs five times as many planes and these cost much more; "
+        "else planar",
     )
     width: Length = Field(description="width of a bead; optional with calibration, like height")
     feed: Length = Field(description="speed of deposition, in lengths a minute; less where a bead is higher")

@@ -29,13 +29,11 @@ def steady_axes(points: Floats, axes: Floats, rate: float, width: float) -> Floa
 
 
 def _average(along: Floats, axes: Floats, span: float) -> Floats:
-    """The mean axis over a span round each point; at the ends over what there is on both sides alike."""
-    lengths = np.diff(along)
+    """The mean axis over a span round each point, as far as the pass goes."""
     means = (axes[1:] + axes[:-1]) / 2
-    total = np.concatenate([np.zeros((1, 3)), np.cumsum(means * lengths[:, None], axis=0)])
-    half = np.minimum(span / 2, np.minimum(along - along[0], along[-1] - along))
+    total = np.concatenate([np.zeros((1, 3)), np.cumsum(means * np.diff(along)[:, None], axis=0)])
     low, high = (
-        np.stack([np.interp(at, along, total[:, k]) for k in range(3)], axis=1) for at in (along - half, along + half)
+        np.stack([np.interp(at, along, total[:, k]) for k in range(3)], axis=1)
+        for at in (along - span / 2, along + span / 2)
     )
-    at_end = half < 1e-9 * span
-    return normalise(np.where(at_end[:, None], axes, high - low))
+    return normalise(high - low)
