@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import DepositPath, Floats, Mesh
-from damageest.geometry.solids import to_arrays
+from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.transforms import turn_to_axis
 from damageest_paths.clearance import Clearance
 from damageest_paths.drafts import MUCH_SUNK, Draft, Task
@@ -125,14 +125,27 @@ def describe_surplus(path: DepositPath) -> DepositPath:
     return replace(path, notes=(*path.notes, *notes))
 
 
+def _describe_unreached(path: DepositPath) -> str:
+    """How much is not filled, where the largest piece of it is, and why, on one line."""
+    whole, place = path.deposit_volume, ""
+    if path.missing is not None:
+        largest = max(to_manifold(path.missing).decompose(), key=lambda piece: float(piece.volume()), default=None)
+        if largest is not None:
+            x, y, z = np.array(largest.bounding_box()).reshape(2, 3).mean(axis=0)
+            place = f", the largest piece at ({x:.4g}, {y:.4g}, {z:.4g})"
+    items = sorted(path.unreached, key=lambda item: -item.volume)
+    reasons = [f"{item.volume / whole:.2%} {item.why}" for item in items if item.volume > 1e-4 * whole] or [
+        items[0].why
+    ]
+    volume = path.unreached_volume
+    return f"{volume:.4g} of the deposit ({volume / whole:.2%}) is not filled{place}: {'; '.join(reasons)}"
+
+
 def _add_notes(path: DepositPath, moves: Moves, process: Process) -> DepositPath:
     notes = []
     share = path.unreached_volume / path.deposit_volume
-    for item in path.unreached:
-        if item.volume > 1e-6 * path.deposit_volume:
-            notes.append(
-                f"{item.volume:.4g} of the deposit ({item.volume / path.deposit_volume:.2%}) is not filled: {item.why}"
-            )
+    if share > 1e-6:
+        notes.append(_describe_unreached(path))
     if share > 1e-3 and process.axes != 5:
         notes.append("more axes (path.axes: 5), another path.direction or a slimmer nozzle may reach more")
     total = path.length + path.travel

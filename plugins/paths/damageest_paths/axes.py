@@ -20,6 +20,8 @@ ROOM = 1.5
 """Multiple of the distance needed that counts as room to spare."""
 BEST = 3
 """Axes that are tried all along a pass before it is let turn."""
+EASED = (0.25, 0.5, 0.75)
+"""Shares of a tilt that are tried in turn, whether they do too."""
 ROUNDS = 2
 """How often the turning axes of a pass are chosen, without the poses that turned out not to be free."""
 
@@ -28,12 +30,13 @@ ROUNDS = 2
 class Limits:
     """``needed``: distance that the nozzle has to keep. ``step``: how far any of its points moves between two poses
     that are measured. ``rate``: largest turn of the axis per length along a pass, in radians. ``least``: points of a
-    piece of a pass."""
+    piece of a pass. ``eases``: whether axes are tilted by no more than it takes."""
 
     needed: float
     step: float
     rate: float
     least: int
+    eases: bool = False
 
 
 class Piece(NamedTuple):
@@ -85,6 +88,8 @@ def choose_axes(
         table = PoseTable(lines, axes, clearance, limits.needed, ROOM * limits.needed)
         going = _share_axes(found, lines, table, first, clearance, limits)
         _let_turn(found, going, lines, table, clearance, limits)
+        if limits.eases:
+            _ease(found, lines, clearance, limits)
     return [_cut(one, limits) for one in found]
 
 
@@ -151,6 +156,29 @@ def _let_turn(
                 going = [other for other in going if other != k]
         if not going:
             break
+
+
+def _ease(found: list[_Found], lines: Sequence[Floats], clearance: Clearance, limits: Limits) -> None:
+    """Replaces what was found for passes along which the tool is tilted by the least share of that at which they are
+    free."""
+    left = [k for k, one in enumerate(found) if _is_free(one, limits) and one.course.axes[:, 2].min() < 1 - 1e-9]
+    for share in EASED:
+        if not left:
+            break
+        courses = [Course(turn_upright(found[k].course.axes, share), found[k].course.joined) for k in left]
+        tried = _measure(courses, [lines[k] for k in left], clearance, limits)
+        eased = {k: one for k, one in zip(left, tried, strict=True) if _is_free(one, limits)}
+        for k, one in eased.items():
+            found[k] = one
+        left = [k for k in left if k not in eased]
+
+
+def turn_upright(axes: Floats, share: float) -> Floats:
+    """Axes (N,3) with a share of their angle with z."""
+    flat = np.linalg.norm(axes[:, :2], axis=1)
+    angle = share * np.arctan2(flat, axes[:, 2])
+    side = axes[:, :2] / np.maximum(flat, 1e-300)[:, None]
+    return np.column_stack([np.sin(angle)[:, None] * side, np.cos(angle)])
 
 
 def _fill_in(costs: Floats, count: int) -> Floats:

@@ -195,7 +195,7 @@ def crop_metal(metal: Any, body: Any, under: float, beside: float, over: float) 
 
 
 class _AxisChoice:
-    """Places the lines of a layer with tool axes. It remembers which axis served last."""
+    """Places the lines of a layer with tool axes."""
 
     def __init__(self, process: Process, clearance: Clearance) -> None:
         self.process, self.clearance = process, clearance
@@ -208,7 +208,6 @@ class _AxisChoice:
         self.lowest = np.array([_find_lowest(clearance, axis) for axis in axes])
         self.axes = axes[self.lowest >= process.gap * (1 - 1e-9)]
         self.lowest = self.lowest[self.lowest >= process.gap * (1 - 1e-9)]
-        self.last = 0
 
     def place(self, lines: Sequence[Line], top: float, layer: int) -> tuple[list[Pass], list[Floats], list[Floats]]:
         """Passes along the lines at a height; the pieces of lines (K,2) that the nozzle does not reach, and those that
@@ -220,12 +219,12 @@ class _AxisChoice:
             return made, [line.points for line in lines], dropped
         process = self.process
         least = int(np.ceil(process.shortest / process.step)) + 2
-        limits = Limits(needed, process.step, process.turn_rate, least)
+        limits = Limits(needed, process.step, process.turn_rate, least, not process.is_trial)
         sampled = []
         for line in lines:
             flat = extend_line(line.points, *process.extend)
             sampled.append(resample(np.column_stack([flat, np.full(len(flat), top)]), process.step))
-        chosen = choose_axes([points for points, _ in sampled], self.axes, self.last, clearance, limits)
+        chosen = choose_axes([points for points, _ in sampled], self.axes, 0, clearance, limits)
         for (points, corner), pieces, line in zip(sampled, chosen, lines, strict=True):
             at = 0
             long = [each for each in pieces if measure_length(points[each.start : each.stop]) >= process.shortest]
@@ -236,8 +235,6 @@ class _AxisChoice:
                 made.append(self._make_pass(points, corner, piece, layer, line.kind))
             if at < len(points):
                 dropped.append(points[at:])
-            if long:
-                self.last = int(np.argmax(self.axes @ long[-1].axes[-1]))
         body = clearance.without_beam()
         shaded = [self._is_free(points, body) for points in dropped]
         flat_pieces = [points[:, :2] for points in dropped]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from damageest_paths.axes import turn_upright
 from damageest_paths.frames import make_frame
 from damageest_paths.reach import is_reached, keep_reached, turn_reach
 from damageest_paths.regions import make_region
@@ -12,6 +13,7 @@ from damageest_paths.stripes import Bead
 from damageest_paths.weave import Style, weave_piece
 
 from damageest.geometry.vectors import normalise
+from tests.path_shapes import plan, slot
 
 HALF = np.array([0.0, 0.0, 1.0, 0.0, 1.0])
 """A machine that reaches all axes that do not point down."""
@@ -57,3 +59,18 @@ def test_even_borders_keep_nearly_all_of_a_region() -> None:
     assert abs(even.area() - 200) < 1.0
     assert even.bounds()[2] < 20.5
     assert drop_narrow(square + spike, 2.0).bounds()[2] < 20.5
+
+
+def test_what_is_not_filled_is_one_note_that_says_where() -> None:
+    path = plan(slot(), axes=3, height=4.0, width=6.0, standoff=6.0, simulate=False)
+    told = [note for note in path.notes if "is not filled" in note]
+    assert path.unreached_volume > 0
+    assert len(told) == 1
+    assert ", the largest piece at (" in told[0]
+    assert all(item.why in told[0] for item in path.unreached if item.volume > 1e-3 * path.deposit_volume)
+
+
+def test_passes_are_tilted_by_no_more_than_it_takes() -> None:
+    axes = np.array([[0.0, 0.0, 1.0], [np.sin(0.8), 0.0, np.cos(0.8)]])
+    half = turn_upright(axes, 0.5)
+    assert np.allclose(half, [[0, 0, 1], [np.sin(0.4), 0, np.cos(0.4)]])
