@@ -56,7 +56,7 @@ def test_it_is_not_said_beside_sites_that_the_pose_makes(dented: Floats) -> None
     assert shallow
     assert result.fit.model == "open"
     assert not result.fit.words.startswith(SAID)
-    assert re.search(rf"site.* {shallow[-1]}\b.* may be skin that deviates", result.fit.words)
+    assert re.search(rf"site.* {shallow[-1]}\b.* may be deviating skin", result.fit.words)
     assert result.fit.words in [note.text for note in result.warnings]
 
 

@@ -31,6 +31,7 @@ from damageest_benchmarks.commands import (
     honesty,
     inspections,
     named,
+    others,
     path,
     prepare,
     real,
@@ -53,6 +54,7 @@ app.command("family")(family.command)
 app.command("honesty")(honesty.command)
 app.command("inspections")(inspections.command)
 app.command("named")(named.command)
+app.command("others")(others.command)
 app.command("real")(real.command)
 app.command("realistic")(realistic.command)
 app.command("steady")(steady.command)

@@ -16,10 +16,11 @@ from damageest.geometry.transforms import move_points
 from damageest.io.meshes import write_points
 from damageest_benchmarks.families.scene import Draw, draw_motion, move_out
 
-POINTS = 30_000
-"""Points on the part; what is around it has as many for its area, up to twice as many."""
-NOISE = 0.0004
-"""As a share of the diagonal; the tolerance is six of them."""
+POINTS = 40_000
+"""Points on the part; what is around it has as many for its area."""
+NOISE, TOLERANCE = 0.0006, 8
+"""Noise as a share of the diagonal, and the tolerance in noises: edges of an earlier scan are rounded by about half of
+its spacing."""
 WAYS = ("as before", "slid and turned", "on its back", "on its side")
 """How the part lies in the later scan. What is around it stays."""
 AROUND = ("table", "table and blocks")
@@ -57,10 +58,10 @@ def _lay(body: Any, way: str, rng: np.random.Generator) -> Floats:
 def _scan(body: Any, motion: Floats, blocks: Any, dense: float, noise: float, rng: np.random.Generator) -> Scan:
     """The part as it lies on the table, with what is around it, from all sides but below."""
     lying = Mesh(*to_arrays(body.transform(motion[:3].tolist())))
-    reach = 1.3 * float(np.linalg.norm(np.ptp(lying.vertices, axis=0)))
+    reach = 0.8 * float(np.linalg.norm(np.ptp(lying.vertices, axis=0)))
     found = [_see(lying, dense, rng)]
     low, high = lying.bounds[:, :2] - [[3.0], [-3.0]]
-    count = min(int(dense * 4 * reach**2), 2 * POINTS)
+    count = int(dense * 4 * reach**2)
     flat = np.column_stack([rng.uniform(-reach, reach, (count, 2)), np.zeros(count)])
     flat = flat[~((flat[:, :2] > low) & (flat[:, :2] < high)).all(axis=1)]
     found.append((flat, np.tile([0.0, 0.0, 1.0], (len(flat), 1))))
@@ -103,7 +104,7 @@ def draw_surroundings(seed: int) -> Draw:
     left = body - chip
     blocks = Manifold()
     if around != "table":
-        beside = 0.75 * diagonal
+        beside = 0.6 * diagonal
         blocks = Manifold.cube((16, 22, 30)).translate((beside, -9, 0)) + Manifold.cube((30, 12, 18)).translate(
             (-beside - 20, 12, 0)
         )
@@ -114,5 +115,5 @@ def draw_surroundings(seed: int) -> Draw:
     damage = to_solid((body - left).transform(before[:3].tolist()), np.zeros(3))
     scan, pose = move_out(later, draw_motion(rng, diagonal))
     to_earlier = before @ np.linalg.inv(after)
-    said: dict[str, str | float] = {"way": way, "around": around, "tolerance": 6 * noise}
-    return Draw(_read_as_part(earlier), scan, damage, to_earlier @ pose, 6 * noise, said=said)
+    said: dict[str, str | float] = {"way": way, "around": around, "tolerance": TOLERANCE * noise}
+    return Draw(_read_as_part(earlier), scan, damage, to_earlier @ pose, TOLERANCE * noise, said=said)

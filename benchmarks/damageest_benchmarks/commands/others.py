@@ -1,0 +1,43 @@
+"""`damageest evaluate others`: parts that others made, with drawn losses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from damageest_evaluate.commands.counted import AsJson, show_table
+
+
+def command(
+    folder: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Folder with files of CAD or meshes.")],
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the losses, scans and poses.")] = 0,
+    workers: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
+    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
+    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for others.jsonl, to resume from.")] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Draw a loss on each part of a folder, run it, and name the stages that take five times the usual.
+
+    120,000 points of unknown pose; noise 0.0004 and tolerance 0.0015 of the diagonal.
+    """
+    from damageest_evaluate.commands.counted import run_counted
+    from damageest_evaluate.job import fingerprint_code
+    from damageest_evaluate.tables import format_markdown
+
+    from damageest.errors import InputError
+    from damageest.registry import Registry
+    from damageest_benchmarks.commands._counted import prepare_places, write_measured
+    from damageest_benchmarks.others import SUFFIXES, describe_file_row, make_file_cases, make_others_table
+
+    prepare_places(out, write, "others")
+    cases = make_file_cases(folder, seed, fingerprint_code(Registry.discover()))
+    if not cases:
+        raise InputError(f"{folder} has no part; put files there that end in {', '.join(SUFFIXES)}")
+    rows = run_counted(cases, out, "others.jsonl", workers, timeout, describe_file_row)
+    table = format_markdown(make_others_table(rows))
+    show_table(table, rows, as_json)
+    write_measured(table, "others", write)
