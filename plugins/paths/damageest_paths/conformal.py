@@ -15,14 +15,14 @@ from damageest_paths.fill import list_lines
 from damageest_paths.floor import Floor, list_floors
 from damageest_paths.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.frames import Frame
+from damageest_paths.holding.reach import turn_reach
+from damageest_paths.holding.shade import drop_narrow, measure_shade, smooth_border
 from damageest_paths.obstacles import COARSER, Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.patches import Patch, list_patches
 from damageest_paths.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
 from damageest_paths.process import Pass, Plan, Process, extend_line
-from damageest_paths.reach import turn_reach
 from damageest_paths.regions import cover, measure_length, resample
-from damageest_paths.shade import drop_narrow, measure_shade, smooth_border
 from damageest_paths.sheets import (
     FINE,
     Grid,

@@ -14,10 +14,10 @@ from damageest.geometry.solids import to_manifold, to_solid
 from damageest_paths.beads import SHARE, Beads, simulate_beads
 from damageest_paths.clearance import Clearance
 from damageest_paths.directions import Planner, gather_missing, list_directions, plan_parts
+from damageest_paths.holding.reach import is_reached
 from damageest_paths.nozzle import Nozzle
 from damageest_paths.planar import Surroundings
 from damageest_paths.process import Pass, Plan, Process
-from damageest_paths.reach import is_reached
 from damageest_paths.turning import divide_turns
 
 MUCH_SUNK = 0.05

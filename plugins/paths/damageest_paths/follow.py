@@ -10,9 +10,9 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.gauges import Gauge, LeastGauge
+from damageest_paths.holding.reach import keep_reached
+from damageest_paths.holding.steady import steady_axes
 from damageest_paths.process import Pass, Process, measure_along
-from damageest_paths.reach import keep_reached
-from damageest_paths.steady import steady_axes
 from damageest_paths.sweeps import Sweeps
 
 Z = np.array([0.0, 0.0, 1.0])

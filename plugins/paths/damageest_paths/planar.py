@@ -16,10 +16,10 @@ from damageest_paths.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance import Clearance
 from damageest_paths.fill import SLIVER, WITHIN, list_lines
 from damageest_paths.frames import Frame
+from damageest_paths.holding.reach import is_reached, turn_reach
 from damageest_paths.obstacles import Obstacles
 from damageest_paths.order import order_passes
 from damageest_paths.process import Pass, Plan, Process, extend_line
-from damageest_paths.reach import is_reached, turn_reach
 from damageest_paths.regions import (
     cover,
     list_pieces,

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 from damageest_paths.axes import turn_upright
 from damageest_paths.frames import make_frame
-from damageest_paths.reach import is_reached, keep_reached, turn_reach
+from damageest_paths.holding.reach import is_reached, keep_reached, turn_reach
+from damageest_paths.holding.shade import drop_narrow, smooth_border
+from damageest_paths.holding.steady import steady_axes
 from damageest_paths.regions import make_region
-from damageest_paths.shade import drop_narrow, smooth_border
-from damageest_paths.steady import steady_axes
 from damageest_paths.stripes import Bead
 from damageest_paths.weave import Style, weave_piece
 

@@ -20,8 +20,9 @@ OVER = 1.05
 ROOM = 1.02
 """Share of the beam's radius that has to be free round its middle: a scanned wall is rough."""
 
-RAGGED, EVEN = 0.25, 0.01
-"""Bead widths within which the border of what is filled is smoothed, and within which that is simplified."""
+RAGGED, NARROW, EVEN = 0.15, 0.5, 0.01
+"""Bead widths within which the border of what is filled is smoothed, and half of those that are too narrow for the
+middles of beads; and those within which borders are simplified."""
 
 
 def measure_shade(sheet: Sheet, reach: Floats, metal: Mesh, height: float, process: Process) -> Floats | None:
@@ -54,4 +55,4 @@ def smooth_border(region: Any, width: float) -> Any:
 
 def drop_narrow(region: Any, width: float) -> Any:
     """A region without what is narrower than a bead of a ``width``."""
-    return shift_border(shift_border(region, -2 * RAGGED * width), 2 * RAGGED * width).simplify(EVEN * width)
+    return shift_border(shift_border(region, -NARROW * width), NARROW * width).simplify(EVEN * width)
