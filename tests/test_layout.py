@@ -60,7 +60,6 @@ CROWDED = {
     "damageest/geometry": 68,
     "damageest/io": 20,
     "plugins/app/damageest_app": 21,
-    "plugins/paths/damageest_paths": 51,
 }
 """Rooms with more, and how many: public names of others, or what nobody has divided yet. None may come to be here."""
 

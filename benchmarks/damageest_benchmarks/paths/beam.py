@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from damageest_paths.frames import make_frame
+from damageest_paths.process.frames import make_frame
 
 from damageest.artefacts import DepositPath, Floats, Ints, Solid
 from damageest.geometry.distance import distance_to_mesh, is_inside

@@ -7,7 +7,7 @@ libigl's, from places on the beads. The planner takes both from FCL and from a f
 from __future__ import annotations
 
 import numpy as np
-from damageest_paths.frames import make_frame
+from damageest_paths.process.frames import make_frame
 from manifold3d import Manifold
 
 from damageest.artefacts import DepositPath, Floats, Ints, Mesh, Solid

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from damageest_evaluate.damages import PlacePicker
 from damageest_evaluate.rows import read_rows
-from damageest_paths.directions import find_open_normal
+from damageest_paths.layering.directions import find_open_normal
 from damageest_paths.layers import Layers
 
 from damageest.artefacts import Part, Solid

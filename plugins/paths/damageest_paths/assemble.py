@@ -10,13 +10,13 @@ import numpy as np
 from damageest.artefacts import DepositPath, Floats, Mesh
 from damageest.geometry.solids import to_arrays, to_manifold
 from damageest.geometry.transforms import turn_to_axis
-from damageest_paths.clearance import Clearance
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import COARSER, Obstacles, draw_passes
 from damageest_paths.drafts import MUCH_SUNK, Draft, Task
-from damageest_paths.exits import Travel
-from damageest_paths.moves import Moves, find_corners, join_passes, rank_layers
-from damageest_paths.obstacles import COARSER, Obstacles, draw_passes
-from damageest_paths.planar import Surroundings
-from damageest_paths.process import Pass, Plan, Process
+from damageest_paths.layering.planar import Surroundings
+from damageest_paths.process.process import Pass, Plan, Process
+from damageest_paths.travel.exits import Travel
+from damageest_paths.travel.moves import Moves, find_corners, join_passes, rank_layers
 
 MUCH_TRAVEL, MUCH_SURPLUS = 0.2, 0.1
 """Shares from which a note says how much it is: travel, of the whole way; what is added beyond the deposit, of the

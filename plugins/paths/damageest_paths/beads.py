@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import BeadFill, Flags, Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.voxels import measure_bounds
-from damageest_paths.frames import Frame
+from damageest_paths.process.frames import Frame
 
 SHARE = 4
 """Voxels along the shorter side of a bead's section."""

@@ -12,13 +12,13 @@ from damageest.artefacts import BeadFill, Floats, Mesh, Solid, Unreached
 from damageest.geometry.simplification import simplify_within
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest_paths.beads import SHARE, Beads, simulate_beads
-from damageest_paths.clearance import Clearance
-from damageest_paths.directions import Planner, gather_missing, list_directions, plan_parts
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.turning import divide_turns
 from damageest_paths.holding.reach import is_reached
-from damageest_paths.nozzle import Nozzle
-from damageest_paths.planar import Surroundings
-from damageest_paths.process import Pass, Plan, Process
-from damageest_paths.turning import divide_turns
+from damageest_paths.layering.directions import Planner, gather_missing, list_directions, plan_parts
+from damageest_paths.layering.planar import Surroundings
+from damageest_paths.process.process import Pass, Plan, Process
+from damageest_paths.tool.nozzle import Nozzle
 
 MUCH_SUNK = 0.05
 """Share of the deposit from which what of the beads lies in intact metal is much."""

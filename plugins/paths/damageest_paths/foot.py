@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from damageest.artefacts import DepositPath, Floats, Ints, Mesh, Solid
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.vectors import normalise
-from damageest_paths.places import cut_moves, find_middles
+from damageest_paths.process.places import cut_moves, find_middles
 
 LEAST, MOST = 0.1, 0.6
 """Shares of a layer's height: air from which a bead is made higher, and by how much at most."""

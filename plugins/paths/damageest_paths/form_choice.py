@@ -8,13 +8,13 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from damageest.artefacts import DepositPath
-from damageest_paths.conformal import plan_conformal
-from damageest_paths.directions import Planner
 from damageest_paths.drafts import MUCH_SUNK, Draft
-from damageest_paths.frames import Frame
-from damageest_paths.planar import SHORT, SUNK, Surroundings, plan_planar
-from damageest_paths.process import Plan as LayerPlan
-from damageest_paths.process import Process
+from damageest_paths.layering.conformal import plan_conformal
+from damageest_paths.layering.directions import Planner
+from damageest_paths.layering.planar import SHORT, SUNK, Surroundings, plan_planar
+from damageest_paths.process.frames import Frame
+from damageest_paths.process.process import Plan as LayerPlan
+from damageest_paths.process.process import Process
 
 Form = Literal["auto", "planar", "conformal"]
 PLANNERS: dict[str, Planner] = {"planar": plan_planar, "conformal": plan_conformal}

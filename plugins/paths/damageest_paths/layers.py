@@ -13,9 +13,9 @@ from damageest.errors import StageError
 from damageest.options import Options
 from damageest.stages import JobPath
 from damageest.stages.path import Path
-from damageest_paths.calibration import Trials, check_reach, complete_size, relax_size
-from damageest_paths.channels import SPEED, ProcessTable, list_channels
-from damageest_paths.mesh_files import find_mesh_fault, read_mesh_file
+from damageest_paths.process.calibration import Trials, check_reach, complete_size, relax_size
+from damageest_paths.process.channels import SPEED, ProcessTable, list_channels
+from damageest_paths.tool.mesh_files import find_mesh_fault, read_mesh_file
 
 Length = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Angle = Annotated[float, Field(allow_inf_nan=False)]
@@ -236,15 +236,15 @@ class Layers(Path):
     ) -> DepositPath | None:
         """The path. Raises StageError where the nozzle, the fixture or the direction cannot be used."""
         from damageest_paths.assemble import Speeds, describe_surplus, plan_moves
-        from damageest_paths.directions import Planner, find_open_normal
         from damageest_paths.drafts import Draft, Task, draft_path
+        from damageest_paths.fill.stripes import Bead
         from damageest_paths.foot import raise_beads
         from damageest_paths.form_choice import plan_in_form
         from damageest_paths.laid import simulate_laid
-        from damageest_paths.process import Cooling, Process
-        from damageest_paths.settings import add_sizes, apply_table
-        from damageest_paths.sight import Beam
-        from damageest_paths.stripes import Bead
+        from damageest_paths.layering.directions import Planner, find_open_normal
+        from damageest_paths.process.process import Cooling, Process
+        from damageest_paths.process.settings import add_sizes, apply_table
+        from damageest_paths.tool.sight import Beam
 
         fast = self.travel_feed or 5 * self.feed
         process = Process(
@@ -297,7 +297,7 @@ class Layers(Path):
         return describe_surplus(simulate_laid(path, draft))
 
     def _make_nozzle(self) -> Any:
-        from damageest_paths import nozzle
+        from damageest_paths.tool import nozzle
 
         shape = self.nozzle
         if shape.mesh is not None:

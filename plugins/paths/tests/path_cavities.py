@@ -5,13 +5,13 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from damageest_paths.clearance import Clearance
-from damageest_paths.floor import Floor, list_floors
-from damageest_paths.frames import Frame, make_frame
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.planar import Surroundings
-from damageest_paths.process import Process
-from damageest_paths.stripes import Bead
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.fill.stripes import Bead
+from damageest_paths.layering.planar import Surroundings
+from damageest_paths.process.frames import Frame, make_frame
+from damageest_paths.process.process import Process
+from damageest_paths.sheets.floor import Floor, list_floors
+from damageest_paths.tool.nozzle import Cone, make_nozzle
 from manifold3d import CrossSection, Manifold
 
 from damageest.geometry.solids import to_manifold, to_solid

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from damageest_paths.beads import Beads, simulate_beads, stamp_beads
-from damageest_paths.frames import make_frame
+from damageest_paths.process.frames import make_frame
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 

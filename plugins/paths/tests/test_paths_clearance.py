@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from damageest_paths.clearance import Clearance
-from damageest_paths.frames import make_frame
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.process.frames import make_frame
+from damageest_paths.tool.nozzle import Cone, make_nozzle
 
 from damageest.artefacts import Floats, Mesh
 

@@ -7,12 +7,12 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from damageest_paths.conformal import plan_conformal
-from damageest_paths.floor import Depth, Floor
-from damageest_paths.planar import plan_planar
-from damageest_paths.process import Pass, Plan
-from damageest_paths.regions import measure_length
-from damageest_paths.sheets import Sheet, SheetTree
+from damageest_paths.fill.regions import measure_length
+from damageest_paths.layering.conformal import plan_conformal
+from damageest_paths.layering.planar import plan_planar
+from damageest_paths.process.process import Pass, Plan
+from damageest_paths.sheets.floor import Depth, Floor
+from damageest_paths.sheets.sheets import Sheet, SheetTree
 from manifold3d import Manifold
 from path_cavities import (
     BALL,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import damageest_paths.conformal
-import damageest_paths.directions
+import damageest_paths.layering.conformal
+import damageest_paths.layering.directions
 import numpy as np
 import pytest
-from damageest_paths.conformal import plan_conformal
-from damageest_paths.directions import choose_direction
-from damageest_paths.floor import Floor, make_floor
-from damageest_paths.frames import Frame
-from damageest_paths.planar import Surroundings, plan_planar
-from damageest_paths.process import Plan, Process
+from damageest_paths.layering.conformal import plan_conformal
+from damageest_paths.layering.directions import choose_direction
+from damageest_paths.layering.planar import Surroundings, plan_planar
+from damageest_paths.process.frames import Frame
+from damageest_paths.process.process import Plan, Process
+from damageest_paths.sheets.floor import Floor, make_floor
 from manifold3d import Manifold
 from path_cavities import pocket, prepare, stair
 
@@ -41,7 +41,7 @@ def test_trials_given_up_are_those_of_no_chosen_direction(loss: Loss, monkeypatc
         return choose_direction(scene.body, np.zeros(3), directions, scene.around, scene.process, run)
 
     plan, some = choose(), list(trials)
-    monkeypatch.setattr(damageest_paths.directions, "CLEARLY_WORSE", np.inf)
+    monkeypatch.setattr(damageest_paths.layering.directions, "CLEARLY_WORSE", np.inf)
     whole, every = choose(), list(trials)
     given_up = [one for one, (passes, _) in enumerate(some) if not passes]
     assert given_up
@@ -72,7 +72,9 @@ def test_of_floors_that_leave_much_uncovered_the_one_that_leaves_least_is_filled
     uncovered: list[float] = []
 
     def plan_over(some: list[Floor]) -> Plan:
-        monkeypatch.setattr(damageest_paths.conformal, "list_floors", lambda *_: iter([(one, 1.0) for one in some]))
+        monkeypatch.setattr(
+            damageest_paths.layering.conformal, "list_floors", lambda *_: iter([(one, 1.0) for one in some])
+        )
         uncovered.clear()
         return plan_conformal(scene.body, scene.frame, scene.around, scene.process, 1.0, uncovered.append)
 

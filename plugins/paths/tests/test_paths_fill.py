@@ -7,11 +7,11 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from damageest_paths.fill import fill_region, list_lines
-from damageest_paths.joints import find_reversals
-from damageest_paths.regions import cover, list_pieces, make_region, measure_length
-from damageest_paths.stripes import Bead
-from damageest_paths.weave import Pattern
+from damageest_paths.fill.fill import fill_region, list_lines
+from damageest_paths.fill.joints import find_reversals
+from damageest_paths.fill.regions import cover, list_pieces, make_region, measure_length
+from damageest_paths.fill.stripes import Bead
+from damageest_paths.fill.weave import Pattern
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import CrossSection

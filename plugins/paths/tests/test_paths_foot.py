@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_paths.anchor import find_foot
 from damageest_paths.foot import measure_air
+from damageest_paths.layering.anchor import find_foot
 from manifold3d import Manifold
 
 from tests.path_shapes import BLOCK, cut, plan

@@ -11,8 +11,8 @@ from damageest_benchmarks.paths.check import measure_nozzle
 from damageest_paths import assemble, form_choice
 from damageest_paths.drafts import MUCH_SUNK
 from damageest_paths.form_choice import MOST_LEFT, PLANNERS, POOR, measure_lost
-from damageest_paths.moves import Moves, join_passes
-from damageest_paths.process import Pass
+from damageest_paths.process.process import Pass
+from damageest_paths.travel.moves import Moves, join_passes
 from manifold3d import CrossSection
 from path_cavities import pocket, stair
 

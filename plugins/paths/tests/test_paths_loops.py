@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
-from damageest_paths.clearance import Clearance
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.tool.nozzle import Cone, make_nozzle
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -18,9 +18,9 @@ from tests.needs import import_or_skip
 
 numba = import_or_skip("numba")
 if TYPE_CHECKING:
-    from damageest_paths import compiling
+    from damageest_paths.clearance import compiling
 else:
-    compiling = import_or_skip("damageest_paths.compiling")
+    compiling = import_or_skip("damageest_paths.clearance.compiling")
 
 CONES = {
     "nozzle": Cone(1.0, 4.0, 12.0, np.radians(20)),

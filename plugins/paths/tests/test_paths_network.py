@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from damageest_paths.clearance import Clearance
-from damageest_paths.exits import Travel
-from damageest_paths.moves import join_passes
-from damageest_paths.network import measure_way
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
-from damageest_paths.process import Pass
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.process.process import Pass
+from damageest_paths.tool.nozzle import Cone, make_nozzle
+from damageest_paths.travel.exits import Travel
+from damageest_paths.travel.moves import join_passes
+from damageest_paths.travel.network import measure_way
 from manifold3d import Manifold
 
 from damageest.artefacts import Floats, Mesh

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from damageest_paths.clearance import Clearance
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
-from damageest_paths.order import order_passes
-from damageest_paths.process import Pass, Process
-from damageest_paths.stripes import Bead
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.fill.stripes import Bead
+from damageest_paths.process.process import Pass, Process
+from damageest_paths.tool.nozzle import Cone, make_nozzle
+from damageest_paths.travel.order import order_passes
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from damageest_benchmarks.paths.check import measure_built, measure_nozzle
-from damageest_paths.clearance import Clearance
-from damageest_paths.exits import Travel
-from damageest_paths.moves import Moves, join_passes
-from damageest_paths.nozzle import Cone, Nozzle, make_nozzle, make_nozzle_mesh
-from damageest_paths.obstacles import Obstacles, draw_passes
-from damageest_paths.process import Pass
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles, draw_passes
+from damageest_paths.process.process import Pass
+from damageest_paths.tool.nozzle import Cone, Nozzle, make_nozzle, make_nozzle_mesh
+from damageest_paths.travel.exits import Travel
+from damageest_paths.travel.moves import Moves, join_passes
 from manifold3d import Manifold
 
 from damageest.artefacts import Floats, Mesh

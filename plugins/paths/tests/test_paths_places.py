@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from damageest_paths.calibration import Trial, predict_beads
-from damageest_paths.interpass import add_waits, measure_rest
 from damageest_paths.layers import Layers
-from damageest_paths.places import cut_moves, measure_radius, measure_widths
+from damageest_paths.process.calibration import Trial, predict_beads
+from damageest_paths.process.interpass import add_waits, measure_rest
+from damageest_paths.process.places import cut_moves, measure_radius, measure_widths
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-from damageest_paths.axes import list_axes
-from damageest_paths.clearance import Clearance
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
-from damageest_paths.pose_table import PoseTable
+from damageest_paths.clearance.axes import list_axes
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.clearance.pose_table import PoseTable
+from damageest_paths.tool.nozzle import Cone, make_nozzle
 
 from damageest.artefacts import Floats, Mesh
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-import damageest_paths.sheets
+import damageest_paths.sheets.sheets
 import numpy as np
 import pytest
-from damageest_paths.floor import Depth, Floor, make_floor
-from damageest_paths.sheets import Grid, Sheet, lay_ground, lay_sheet, make_grid, measure_reach
+from damageest_paths.sheets.floor import Depth, Floor, make_floor
+from damageest_paths.sheets.sheets import Grid, Sheet, lay_ground, lay_sheet, make_grid, measure_reach
 from path_cavities import bowl, groove, make_process, prepare, stair
 
 from damageest.artefacts import Floats, Mesh
@@ -70,7 +70,7 @@ def test_columns_that_go_to_and_fro_are_left_where_they_would_end(monkeypatch: p
     grid = make_grid(floor, floor.mesh.vertices + np.array([0.0, 0.0, 1.0]), PROCESS)
     sheets = lay(floor, grid)
     few = sum(asked)
-    monkeypatch.setattr(damageest_paths.sheets, "CYCLE", -1.0)
+    monkeypatch.setattr(damageest_paths.sheets.sheets, "CYCLE", -1.0)
     to_the_end = lay(floor, grid)
     assert few < 0.9 * (sum(asked) - few)
     for sheet, other in zip(sheets, to_the_end, strict=True):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from damageest_paths.clearance import Clearance
-from damageest_paths.network import Way, measure_way
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
-from damageest_paths.process import measure_along
-from damageest_paths.shortcuts import cut_corners
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.process.process import measure_along
+from damageest_paths.tool.nozzle import Cone, make_nozzle
+from damageest_paths.travel.network import Way, measure_way
+from damageest_paths.travel.shortcuts import cut_corners
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold

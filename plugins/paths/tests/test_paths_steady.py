@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import numpy as np
-from damageest_paths.axes import turn_upright
-from damageest_paths.frames import make_frame
+from damageest_paths.clearance.axes import turn_upright
+from damageest_paths.fill.regions import make_region
+from damageest_paths.fill.stripes import Bead
+from damageest_paths.fill.weave import Style, weave_piece
 from damageest_paths.holding.reach import is_reached, keep_reached, turn_reach
 from damageest_paths.holding.shade import drop_narrow, smooth_border
 from damageest_paths.holding.steady import steady_axes
-from damageest_paths.regions import make_region
-from damageest_paths.stripes import Bead
-from damageest_paths.weave import Style, weave_piece
+from damageest_paths.process.frames import make_frame
 
 from damageest.geometry.vectors import normalise
 from tests.path_shapes import plan, slot

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from damageest_paths.clearance import Clearance
-from damageest_paths.nozzle import Cone, make_nozzle
-from damageest_paths.obstacles import Obstacles
-from damageest_paths.sight import Beam
-from damageest_paths.sweeps import Sweeps
+from damageest_paths.clearance.clearance import Clearance
+from damageest_paths.clearance.obstacles import Obstacles
+from damageest_paths.holding.sweeps import Sweeps
+from damageest_paths.tool.nozzle import Cone, make_nozzle
+from damageest_paths.tool.sight import Beam
 
 from damageest.artefacts import Flags, Floats, Mesh
 from damageest.geometry.vectors import normalise

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from damageest_benchmarks.paths.check import measure_nozzle
-from damageest_paths.axes import list_axes
-from damageest_paths.turning import BLOCKED, divide_turns, plan_course, turn_evenly
+from damageest_paths.clearance.axes import list_axes
+from damageest_paths.clearance.turning import BLOCKED, divide_turns, plan_course, turn_evenly
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold

@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest.geometry.vectors import normalise
-from damageest_paths.frames import Frame
+from damageest_paths.process.frames import Frame
 
 INSIDE, EXACT = 1e-7, 1e-9
 """Cosine by which an axis is moved within the limits, and by which it may be beyond them."""

@@ -8,10 +8,10 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
-from damageest_paths.follow import limit_tilt
-from damageest_paths.process import Process
-from damageest_paths.regions import shift_border
-from damageest_paths.sheets import Sheet
+from damageest_paths.fill.regions import shift_border
+from damageest_paths.holding.follow import limit_tilt
+from damageest_paths.process.process import Process
+from damageest_paths.sheets.sheets import Sheet
 
 HEIGHTS = (0.5, 1.0, 2.0)
 """Heights above the bead, in radii of the beam, at which walls are looked for; what is higher the tool leans from."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.geometry.vectors import normalise
-from damageest_paths.process import measure_along
+from damageest_paths.process.process import measure_along
 
 LEAST, MOST = 2.0, 32.0
 """Lengths in bead widths over which axes are averaged: at least, and at most where they turn too fast."""

@@ -1,0 +1,8 @@
+"""Fills a region of a plane with passes: regions, patterns, joints."""
+
+# fill.py: patterns that fill a layer
+# joints.py: joins lines whose ends are near into one pass, where that makes no reversal
+# regions.py: regions of a plane as manifold3d's CrossSection, which has the polygons and offsets of Clipper2
+# stripes.py: fills a region with parallel rows that cover all of it
+# trim.py: cuts lines where the middle of a bead may not lie, and lengthens those that are shorter than a pass may be
+# weave.py: fills a region with few long passes
