@@ -179,7 +179,7 @@ def require_above_noise(tolerance: float, scan: Scan, part: Part) -> None:
     points, _ = sample_by_area(part, max(count, 1), np.random.default_rng(0))
     smooth, spacing = measure_noise_and_spacing(points)
     if spacing > 0 and smooth < tolerance / FAR_BELOW:
-        raise _refuse_tolerance(tolerance, scan.noise, part, "; is it a length in another unit than the scan's is now?")
+        raise _refuse_tolerance(tolerance, scan.noise, part, "; is it in another unit than the scan?")
 
 
 def _refuse_tolerance(tolerance: float, noise: float, part: Part, hint: str = "") -> InputError:

@@ -79,7 +79,7 @@ def test_a_tolerance_far_below_the_noise() -> None:
     noise, spacing = measure_noise_and_spacing(scan.points)
     scan = replace(scan, noise=noise, spacing=spacing)
     require_above_noise(0.2, scan, part)
-    with pytest.raises(InputError, match=r"noise of the scan is 0\.2 mm, .* at least 0\.8\d? mm.* in another unit"):
+    with pytest.raises(InputError, match=r"noise of the scan, 0\.2 mm; .* at least 0\.8\d? mm.* another unit"):
         require_above_noise(0.05, scan, part)
 
 
