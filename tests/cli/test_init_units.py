@@ -70,7 +70,7 @@ def test_a_tolerance_in_another_unit_is_refused_before_the_alignment(home: Path)
     """By the command line: no pose is looked for."""
     job = home / "late.yaml"
     text = damaged_box.JOB.replace("align: none\n", "").replace("scan.ply", "{path: inches.ply, unit: in}")
-    for tolerance, said in ((0.006, "is it a length in another unit"), (20.0, "no damage can be found")):
+    for tolerance, said in ((0.006, "is it in another unit"), (20.0, "no damage can be found")):
         job.write_text(text.replace("0.2", str(tolerance)))
         status, output = call("run", job)
         assert (status, said in output) == (2, True), output

@@ -20,9 +20,10 @@ def command(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Draw a loss on each part of a folder, run it, and name the stages that take five times the usual.
+    """Find a drawn loss on each part of a folder.
 
-    120,000 points of unknown pose; noise 0.0004 and tolerance 0.0015 of the diagonal.
+    Stages that take five times their median are named. 120,000 points of unknown pose; noise 0.0004 and tolerance
+    0.0015 of the diagonal.
     """
     from damageest_evaluate.commands.counted import run_counted
     from damageest_evaluate.job import fingerprint_code
