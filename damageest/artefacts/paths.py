@@ -30,7 +30,8 @@ class BeadFill(Checked):
     ``largest_gap``: that of its largest connected piece; ``void``: diameter of the largest ball in it. ``spill``:
     volume of beads outside the deposit and the metal; ``spill_distance``: how far it reaches from the deposit.
     ``sunk``: volume of beads where metal is already. ``of_deposit``: share of the whole deposit that is filled, what is
-    listed as unreached included.
+    listed as unreached included. ``air`` and ``air_95``: height of the air between metal and the beads that lie on it,
+    in the median and in 95 % of their length; 0 where none lies on metal.
     """
 
     voxel: float
@@ -42,6 +43,8 @@ class BeadFill(Checked):
     spill_distance: float
     sunk: float
     of_deposit: float
+    air: float = 0.0
+    air_95: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

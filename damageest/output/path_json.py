@@ -30,6 +30,8 @@ class BeadFillReport(JsonModel):
         description="share of the whole deposit that beads fill: 1 without the shares of `unreachable_volume` and "
         "`gap`, as far as the voxels resolve it"
     )
+    air: float = Field(description="height of the air between metal and the beads that lie on it, median")
+    air_95: float = Field(description="the height that 95 % of their length does not exceed")
 
 
 class PathReport(JsonModel):

@@ -6,7 +6,7 @@ heats up, warps or shrinks is not simulated.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,12 +15,17 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import BeadFill, Flags, Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.rays import RayCaster
 from damageest.geometry.voxels import measure_bounds
 from damageest_paths.process.frames import Frame
 
 SHARE = 4
 """Voxels along the shorter side of a bead's section."""
 MOST_VOXELS = 60_000_000
+OVERHANGS = 3.0
+"""Air below a bead, in heights of it, from which it hangs over beside the floor."""
+MOST_RAYS = 10_000
+"""Pieces of beads below which the air is measured, or up to twice as many."""
 CHUNK = 2_000_000
 """Places that are stamped at once."""
 
@@ -77,7 +82,30 @@ def simulate_beads(
         far,
         float(sunk.sum() * cell),
         float((done & wanted).sum() / max(int(wanted.sum()), 1)),
+        *(_measure_air(beads, metal, frame.to_local, done, low, edge) if metal is not None else (0.0, 0.0)),
     )
+
+
+def _measure_air(
+    beads: Beads, metal: Mesh, to_local: Callable[[Floats], Floats], done: Flags, low: Floats, edge: float
+) -> tuple[float, float]:
+    """The height of the air, in the median and in 95 % of the length, between metal and the beads that lie on it, not
+    on a bead: below those no voxel is in a bead. ``done``: the voxels in beads."""
+    bottom = beads.height + 1.5 * edge  # the voxel below the bead, whose middle lies outside it
+    below = to_local((beads.start + beads.stop) / 2 - bottom[:, None] * beads.normal)
+    i, j, k = np.clip(np.floor((below - low) / edge).astype(np.int64), 0, np.array(done.shape) - 1).T
+    some = np.flatnonzero(~done[i, j, k])
+    some = some[:: max(1, len(some) // MOST_RAYS)]
+    middle, height = (beads.start + beads.stop)[some] / 2, beads.height[some]
+    depth = RayCaster(metal).find_first(middle, -beads.normal[some])[0]
+    air, length = np.maximum(depth - height, 0.0), np.linalg.norm((beads.stop - beads.start)[some], axis=1)
+    on_metal = air < OVERHANGS * height  # what is farther from it hangs over beside the floor
+    order = np.argsort(air[on_metal], kind="stable")
+    total = np.cumsum(length[on_metal][order])
+    if not len(total):
+        return 0.0, 0.0
+    half, most = np.searchsorted(total, [0.5 * total[-1], 0.95 * total[-1]])
+    return float(air[on_metal][order][half]), float(air[on_metal][order][most])
 
 
 def _measure_depth(gaps: Flags, boxes: Sequence[tuple[slice, ...]]) -> float:

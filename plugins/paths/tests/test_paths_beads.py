@@ -63,3 +63,18 @@ def test_the_largest_gap_is_as_wide_as_it_is() -> None:
     assert fill.filled == pytest.approx(8 * 1.0 / (8 * 4.5), abs=0.02)
     assert fill.void == pytest.approx(HEIGHT, abs=EDGE), "the block is not higher than that"
     assert fill.largest_gap == pytest.approx(2.0 * 8 * HEIGHT, rel=0.3)
+
+
+@pytest.mark.parametrize("air", [0.0, 0.3])
+def test_the_air_below_the_first_beads_is_measured_and_not_that_below_others(air: float) -> None:
+    """Two layers of a wall on a block, the first one above it by some air."""
+    block = box((8.0, 4.5, 2.0))
+    top = float(block.bounds[1, 2])
+    heights = top + air + HEIGHT * np.array([1, 2])
+    start, stop = (np.column_stack([np.full((2, 2), [side, 0.0]), heights]) for side in (-3.0, 3.0))
+    beads = Beads(start, stop, np.tile([0.0, 0, 1], (2, 1)), np.full(2, WIDTH), np.full(2, HEIGHT))
+    deposit = box((6.0, 1.0, 2.0))
+    deposit = Solid(np.add(deposit.vertices, [0, 0, top + 1.0]), deposit.faces)
+    fill = simulate_beads(beads, deposit, None, block, FRAME, EDGE)
+    assert fill.air == pytest.approx(air, abs=1e-6)
+    assert fill.air_95 == pytest.approx(air, abs=1e-6)
