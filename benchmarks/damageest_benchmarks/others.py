@@ -93,7 +93,9 @@ def make_others_table(rows: Sequence[Row]) -> list[list[str]]:
             str(row["sites"]), f"{row['iou']:.3f}", pose, f"{row['seconds']:.0f}",
         ]  # fmt: skip
         said = _shorten(row["error"]) or ", ".join(sorted(set(row["reasons"]))[:4])
-        lines.append([row["part"], str(row["triangles"]), ", ".join(row["kinds"]), *came, ", ".join(slow), said])
+        lines.append(
+            [row["part"], str(row.get("triangles", "")), ", ".join(row["kinds"]), *came, ", ".join(slow), said]
+        )
     return lines
 
 

@@ -50,6 +50,8 @@ def test_a_stage_that_takes_far_longer_than_on_other_parts_is_named() -> None:
     }  # fmt: skip
     slow = row | {"part": "b.stl", "stage_seconds": {"align": 9.0, "enclose": 2.0}}
     bad = row | {"part": "c.stl", "error": "not | watertight", "skipped": True, "triangles": None}
+    ended = {name: value for name, value in row.items() if name != "triangles"} | {"error": "was ended"}
+    assert make_others_table([row, ended])[-1][-1] == "was ended"
     lines = make_others_table([row, row, slow, bad])
     assert [line[-2] for line in lines[1:]] == ["", "", "align 9 s", ""]
     assert lines[-1][-1] == "no part: not / watertight"
