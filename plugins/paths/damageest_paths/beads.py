@@ -91,21 +91,22 @@ def _measure_air(
 ) -> tuple[float, float]:
     """The height of the air, in the median and in 95 % of the length, between metal and the beads that lie on it, not
     on a bead: below those no voxel is in a bead. ``done``: the voxels in beads."""
+    middle, length = (beads.start + beads.stop) / 2, np.linalg.norm(beads.stop - beads.start, axis=1)
     bottom = beads.height + 1.5 * edge  # the voxel below the bead, whose middle lies outside it
-    below = to_local((beads.start + beads.stop) / 2 - bottom[:, None] * beads.normal)
+    below = to_local(middle - bottom[:, None] * beads.normal)
     i, j, k = np.clip(np.floor((below - low) / edge).astype(np.int64), 0, np.array(done.shape) - 1).T
     some = np.flatnonzero(~done[i, j, k])
     some = some[:: max(1, len(some) // MOST_RAYS)]
-    middle, height = (beads.start + beads.stop)[some] / 2, beads.height[some]
-    depth = RayCaster(metal).find_first(middle, -beads.normal[some])[0]
-    air, length = np.maximum(depth - height, 0.0), np.linalg.norm((beads.stop - beads.start)[some], axis=1)
-    on_metal = air < OVERHANGS * height  # what is farther from it hangs over beside the floor
-    order = np.argsort(air[on_metal], kind="stable")
-    total = np.cumsum(length[on_metal][order])
-    if not len(total):
+    depth = RayCaster(metal).find_first(middle[some], -beads.normal[some])[0]
+    air = np.maximum(depth - beads.height[some], 0.0)
+    on_metal = air < OVERHANGS * beads.height[some]  # what is farther from it hangs over beside the floor
+    air, length = air[on_metal], length[some][on_metal]
+    if not len(air):
         return 0.0, 0.0
-    half, most = np.searchsorted(total, [0.5 * total[-1], 0.95 * total[-1]])
-    return float(air[on_metal][order][half]), float(air[on_metal][order][most])
+    order = np.argsort(air, kind="stable")
+    total = np.cumsum(length[order])
+    half, most = air[order][np.searchsorted(total, [0.5 * total[-1], 0.95 * total[-1]])]
+    return float(half), float(most)
 
 
 def _measure_depth(gaps: Flags, boxes: Sequence[tuple[slice, ...]]) -> float:

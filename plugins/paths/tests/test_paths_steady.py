@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 from damageest_paths.clearance.axes import turn_upright
-from damageest_paths.fill.regions import make_region
+from damageest_paths.fill.regions import drop_narrow, make_region, smooth_border
 from damageest_paths.fill.stripes import Bead
 from damageest_paths.fill.weave import Style, weave_piece
 from damageest_paths.holding.reach import is_reached, keep_reached, turn_reach
-from damageest_paths.holding.shade import drop_narrow, smooth_border
 from damageest_paths.holding.steady import steady_axes
 from damageest_paths.process.frames import make_frame
 
@@ -58,7 +57,7 @@ def test_even_borders_keep_nearly_all_of_a_region() -> None:
     even = smooth_border(square + spike, 2.0)
     assert abs(even.area() - 200) < 1.0
     assert even.bounds()[2] < 20.5
-    assert drop_narrow(square + spike, 2.0).bounds()[2] < 20.5
+    assert drop_narrow(square + spike, 1.0).bounds()[2] < 20.5
 
 
 def test_what_is_not_filled_is_one_note_that_says_where() -> None:

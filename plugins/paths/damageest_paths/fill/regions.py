@@ -16,6 +16,8 @@ ROUND = 24
 """Corners of a full circle where a bead's end is drawn as a polygon."""
 SAME = 0.002
 """Bead widths by which a corner may lie beside a line and be left out where its bead is drawn."""
+RAGGED, EVEN = 0.15, 0.01
+"""Bead widths within which a border is smoothed, and within which it is simplified."""
 CHUNK = 1000
 """Points that are compared with all sides of a region at once."""
 
@@ -47,6 +49,23 @@ def shift_border(region: Any, distance: float) -> Any:
     if region.is_empty() or not distance:
         return region
     return region.offset(distance, JoinType.Round, 2.0, ROUND)
+
+
+def drop_narrow(region: Any, radius: float, keeps_corners: bool = False) -> Any:
+    """The region without what is narrower than twice a radius. Its corners become round, or stay as they are."""
+    from manifold3d import JoinType
+
+    shrunk = shift_border(region, -radius)
+    if shrunk.is_empty() or not keeps_corners:
+        return shift_border(shrunk, radius)
+    return shrunk.offset(0.998 * radius, JoinType.Miter, 2.0)
+
+
+def smooth_border(region: Any, width: float) -> Any:
+    """A region without what is ragged along its border, as on a scanned floor: that gives beads of no worth. ``width``
+    of a bead."""
+    grown = shift_border(shift_border(region, RAGGED * width), -2 * RAGGED * width)
+    return shift_border(grown, RAGGED * width).simplify(EVEN * width)
 
 
 def turn_points(points: Floats, angle: float) -> Floats:

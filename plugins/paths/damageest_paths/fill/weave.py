@@ -12,6 +12,7 @@ from damageest_paths.fill.joints import end_at_reversals, join_ends, open_ring
 from damageest_paths.fill.regions import (
     close_ring,
     cover,
+    drop_narrow,
     find_main_angle,
     is_within,
     list_pieces,
@@ -131,16 +132,8 @@ def soften(inner: Any, free: Any, width: float) -> Any:
     closed = shift_border(shift_border(inner, SOFT * width), -SOFT * width)
     if free is not None:
         closed = closed ^ shift_border(free, -INSIDE * width)
-    found = _drop_narrow(closed, SOFT * width).simplify(INSIDE / 2 * width)
+    found = drop_narrow(closed, SOFT * width, keeps_corners=True).simplify(INSIDE / 2 * width)
     return found if free is None else found ^ free
-
-
-def _drop_narrow(region: Any, radius: float) -> Any:
-    """The region without what is narrower than twice a radius; it keeps its corners."""
-    from manifold3d import JoinType
-
-    shrunk = shift_border(region, -radius)
-    return shrunk if shrunk.is_empty() else shrunk.offset(0.998 * radius, JoinType.Miter, 2.0)
 
 
 def _measure_aspect(region: Any) -> float:
@@ -166,7 +159,7 @@ def _list_levels(inner: Any, bead: Bead) -> tuple[list[Floats], list[Line]]:
         rings += read_rings(inner, bead)
         shrunk = shift_border(inner, -step)
         # each of the shifts triples the corners of a smooth border
-        inner = _drop_narrow(shrunk, SOFT / 2 * bead.width).simplify(INSIDE / 2 * bead.width)
+        inner = drop_narrow(shrunk, SOFT / 2 * bead.width, keeps_corners=True).simplify(INSIDE / 2 * bead.width)
         if inner.is_empty() and not shrunk.is_empty():
             middles = [line for piece in list_pieces(shrunk) for line in _draw_middle(piece, bead)]
     return rings, middles

@@ -1,14 +1,11 @@
-"""Regions of a layer along the floor: where a wall stands in the beam of an upright tool, and even borders."""
+"""Where on a layer along the floor a wall beside the bead stands in the beam of an upright tool."""
 
 from __future__ import annotations
-
-from typing import Any
 
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
-from damageest_paths.fill.regions import shift_border
 from damageest_paths.holding.follow import limit_tilt
 from damageest_paths.process.process import Process
 from damageest_paths.sheets.sheets import Sheet
@@ -19,10 +16,6 @@ OVER = 1.05
 """The least height, in radii of the beam, above what the layer lies on."""
 ROOM = 1.02
 """Share of the beam's radius that has to be free round its middle: a scanned wall is rough."""
-
-RAGGED, NARROW, EVEN = 0.15, 0.5, 0.01
-"""Bead widths within which the border of what is filled is smoothed, and half of those that are too narrow for the
-middles of beads; and those within which borders are simplified."""
 
 
 def measure_shade(sheet: Sheet, reach: Floats, metal: Mesh, height: float, process: Process) -> Floats | None:
@@ -44,15 +37,3 @@ def measure_shade(sheet: Sheet, reach: Floats, metal: Mesh, height: float, proce
         least = np.minimum(least, distance_to_mesh(sheet.points[some] + up * upright, metal))
     found[some] = ROOM * radius - least
     return found
-
-
-def smooth_border(region: Any, width: float) -> Any:
-    """A region without what is ragged along its border, as on a scanned floor: that gives beads of no worth. ``width``
-    of a bead."""
-    grown = shift_border(shift_border(region, RAGGED * width), -2 * RAGGED * width)
-    return shift_border(grown, RAGGED * width).simplify(EVEN * width)
-
-
-def drop_narrow(region: Any, width: float) -> Any:
-    """A region without what is narrower than a bead of a ``width``."""
-    return shift_border(shift_border(region, -NARROW * width), NARROW * width).simplify(EVEN * width)

@@ -13,11 +13,11 @@ from damageest.geometry.solids import to_arrays
 from damageest_paths.clearance.clearance import Clearance
 from damageest_paths.clearance.obstacles import COARSER, Obstacles
 from damageest_paths.fill.fill import list_lines
-from damageest_paths.fill.regions import cover, measure_length, resample
+from damageest_paths.fill.regions import EVEN, cover, drop_narrow, measure_length, resample, smooth_border
 from damageest_paths.fill.weave import Line
 from damageest_paths.holding.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.holding.reach import turn_reach
-from damageest_paths.holding.shade import drop_narrow, measure_shade, smooth_border
+from damageest_paths.holding.shade import measure_shade
 from damageest_paths.holding.sweeps import Sweeps
 from damageest_paths.layering.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
 from damageest_paths.layering.unfilled import Unfilled
@@ -51,6 +51,8 @@ THIN = 0.01
 """Share of the layer height up to which what reaches into a layer is left out."""
 
 
+NARROW = 0.5
+"""Half of the bead widths of what is too narrow for the middles of beads."""
 SCRAP = 1.5
 """Bead widths of a pass that are not worth a start beside a longer one."""
 
@@ -244,18 +246,12 @@ class _Work:
         style = process.choose_style(layer)
         if not isinstance(process.starts, str):
             style = style._replace(start=patch.find_direction(process.starts))
-        free = None if shade is None else drop_narrow(patch.draw_region(shade, process), process.bead.width)
-        lines = list_lines(
-            smooth_border(held, process.bead.width),
-            process.pattern,
-            process.bead,
-            angle,
-            free,
-            process.shortest,
-            None,
-            style,
-        )
-        scrap, longest = SCRAP * process.bead.width, max((measure_length(line.points) for line in lines), default=0.0)
+        free, width = None, process.bead.width
+        if shade is not None:
+            free = drop_narrow(patch.draw_region(shade, process), NARROW * width).simplify(EVEN * width)
+        smooth = smooth_border(held, width)
+        lines = list_lines(smooth, process.pattern, process.bead, angle, free, process.shortest, None, style)
+        scrap, longest = SCRAP * width, max((measure_length(line.points) for line in lines), default=0.0)
         least = max(process.shortest, scrap if longest > scrap else 0.0)
         long = [line for line in lines if measure_length(line.points) >= least]
         short = [line.points for line in lines if measure_length(line.points) < least]
