@@ -19,7 +19,7 @@ from damageest.registry import builtins
 from damageest.registry.contracts import STAGES
 from damageest.rules.advice import TOPICS, Topic
 from damageest.rules.notes import RUN_CODES
-from damageest.rules.pose import POSE_CODES
+from damageest.trust.doubts.pose import POSE_CODES
 from tests import damaged_box
 from tests.needs import import_or_skip
 

@@ -20,7 +20,7 @@ PUBLIC_NAMES = {
     "damageest.isolation": set(isolation.__all__),
     "damageest.job": set(job.__all__),
     "damageest.registry": set(registry_package.__all__),
-    "damageest.rules": {"Rule", "SiteFacts", "ScanFacts", "FreePose"},
+    "damageest.rules": {"Rule", "SiteCase", "SiteFacts", "ScanFacts", "FreePose"},
 }
 """Packages of which only the names that they list are public, without their modules."""
 PUBLIC_MODULES = {
@@ -41,7 +41,7 @@ EXCEPTIONS = {
     "damageest_app": {"damageest.job.yamlfile", "damageest.output.folder"},
     "damageest_cadquery": {"damageest.stages.allowance.plain_stock"},
     "damageest_evaluate": {
-        "damageest.checks.scan_quality",
+        "damageest.trust.scan_quality",
         "damageest.job.yamlfile",
         "damageest.stages.scan.scanner",
         "damageest.stages.scan.simulate",
@@ -141,7 +141,7 @@ def test_a_plugin_uses_public_names_only() -> None:
         "from damageest.job.check import load",
         "from damageest.batches.run import batch",
         "from damageest import api",
-        "from damageest.rules.terms import Terms",
+        "from damageest.trust.doubts.terms import Terms",
         "def f():\n    import damageest.pipeline",
     ],
 )

@@ -17,7 +17,6 @@ from damageest_evaluate.case import simulate_scan
 from damageest_evaluate.variants import VariationRequest
 
 from damageest.artefacts import Part, Scan
-from damageest.checks.model_fit import measure_fit
 from damageest.errors import StageError
 from damageest.findings import ModelFit
 from damageest.geometry.distance import signed_distance
@@ -26,6 +25,7 @@ from damageest.geometry.transforms import move_points
 from damageest.registry import Registry
 from damageest.stages.align.register import Register
 from damageest.stages.scan.simulate import Simulate
+from damageest.trust.model_fit import measure_fit
 from damageest_benchmarks.parts import PARTS
 from damageest_benchmarks.suite import make_cases
 from damageest_benchmarks.troubles.parts import NOISE, TOLERANCE, make_named_part

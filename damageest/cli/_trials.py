@@ -33,8 +33,8 @@ def try_plugins(registry: Registry, result: Result | None = None, apart: bool = 
 
 def list_trials(registry: Registry, with_result: bool = True) -> list[tuple[str, str, str]]:
     """What can be tried: its kind, its code or name, and what to call it."""
-    from damageest.checks.verdict import name_rule
     from damageest.registry.guards import name_guarded
+    from damageest.trust.verdict import name_rule
 
     trials = [("rule", rule.code, name_rule(rule)) for rule in registry.rules if rule.owner]
     for name, writer in registry.writers.items():
@@ -80,8 +80,8 @@ def try_one(kind: str, name: str, kept: str, registry: Registry | None = None) -
 
 def _try_rule(registry: Registry, code: str) -> list[str]:
     from damageest.artefacts import Evidence
-    from damageest.checks.verdict import apply_foreign_rule
     from damageest.rules import RULE_FAILED, ScanFacts, SiteFacts
+    from damageest.trust.verdict import apply_foreign_rule
 
     (rule,) = [rule for rule in registry.rules if rule.code == code]
     site = SiteFacts(100.0, 40.0, 120.0, 200, 1.0, 2.0, Evidence(), (95.0, 105.0))

@@ -47,9 +47,9 @@ def _collect() -> list[dict[str, Any]]:
     """All that can be explained, in the order in which it is listed; each has a ``word`` and a ``kind``."""
     from damageest.error_codes import ERROR_CODES, EXIT_STATUSES
     from damageest.registry import Registry
-    from damageest.rules.advice import TOPICS
+    from damageest.rules.advice import make_topics
     from damageest.rules.notes import RUN_CODES
-    from damageest.rules.pose import POSE_CODES
+    from damageest.trust.doubts.pose import POSE_CODES
 
     rules = {rule.code: rule for rule in Registry.discover().rules}
     meanings = {**POSE_CODES, **{code: one.meaning for code, one in RUN_CODES.items()}}
@@ -64,7 +64,7 @@ def _collect() -> list[dict[str, Any]]:
          "page": "docs/command-line.md#exit-statuses"}
         for status, meaning in EXIT_STATUSES.items()
     ]  # fmt: skip
-    return [*map(_make_topic, TOPICS), *reasons.values(), *errors, *statuses]
+    return [*map(_make_topic, make_topics(rules.values())), *reasons.values(), *errors, *statuses]
 
 
 def _make_topic(topic: Topic) -> dict[str, Any]:

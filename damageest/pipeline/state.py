@@ -34,15 +34,6 @@ from damageest.artefacts import (
     Solid,
     Surface,
 )
-from damageest.checks.beyond_points import BeyondPoints
-from damageest.checks.interval.free_pose import Dependence
-from damageest.checks.interval.pose_error import PoseError
-from damageest.checks.interval.scanner import ScannerErrors
-from damageest.checks.interval.site_error import SiteError
-from damageest.checks.model_fit import AskedFit, FittedModel
-from damageest.checks.skin.coverage import SkinView
-from damageest.checks.views.two_sheets import Sheets
-from damageest.checks.views.view_fit import ViewFits
 from damageest.errors import StageError
 from damageest.findings import Budget, Coverage, Explained, Interval, Sensor, Surplus, Uncertainty, Verdict
 from damageest.geometry.lost_depth import measure_lost_depth
@@ -61,6 +52,15 @@ from damageest.stages.export import ExportedFiles, PathWriter, Writer
 from damageest.stages.report import ReportFiles
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
+from damageest.trust.beyond_points import BeyondPoints
+from damageest.trust.interval.free_pose import Dependence
+from damageest.trust.interval.pose_error import PoseError
+from damageest.trust.interval.scanner import ScannerErrors
+from damageest.trust.interval.site_error import SiteError
+from damageest.trust.model_fit import AskedFit, FittedModel
+from damageest.trust.skin.coverage import SkinView
+from damageest.trust.views.two_sheets import Sheets
+from damageest.trust.views.view_fit import ViewFits
 
 MADE_OF = {
     "field": ("part", "aligned", "deviation", "tolerance"),

@@ -71,38 +71,9 @@ def damageest_stages() -> list[type[Stage]]:
 @hookimpl
 def damageest_rules() -> list[type[Rule]]:
     """Every built-in rule, in the order in which reasons of equal effect are listed."""
-    from damageest.rules.adapted_skin import AdaptedSkin
-    from damageest.rules.beside import Beside
-    from damageest.rules.beyond_points import BeyondPointsRule
-    from damageest.rules.covered import Covered
-    from damageest.rules.dent import Dent
-    from damageest.rules.displaced import Displaced
-    from damageest.rules.doubted_scan import DoubtedScan
-    from damageest.rules.fading import FadingOut
-    from damageest.rules.few_points import FewPoints
-    from damageest.rules.free_pose import FreePoseRule
-    from damageest.rules.inner_surface import InnerSurface
-    from damageest.rules.intact_inside import IntactInside
-    from damageest.rules.intact_over import IntactOver
-    from damageest.rules.misplaced_view import MisplacedView
-    from damageest.rules.not_visible import NotVisible
-    from damageest.rules.nothing import Nothing
-    from damageest.rules.off_boundary import OffBoundary
-    from damageest.rules.one_motion import OneMotion
-    from damageest.rules.other_method import OtherMethod
-    from damageest.rules.pieces import Pieces
-    from damageest.rules.pose import PoseDoubt
-    from damageest.rules.revision import Revision
-    from damageest.rules.scattered import Scattered
-    from damageest.rules.terms import Terms
-    from damageest.rules.two_sheets import TwoSheets
-    from damageest.rules.wide_loss import WideLoss
+    from damageest.trust.doubts import list_rules
 
-    return [
-        Nothing, Pieces, PoseDoubt, AdaptedSkin, Displaced, Revision, TwoSheets, MisplacedView, OneMotion, Scattered,
-        OffBoundary, IntactInside, IntactOver, NotVisible, BeyondPointsRule, WideLoss, InnerSurface, Beside, Covered,
-        OtherMethod, DoubtedScan, FreePoseRule, FewPoints, FadingOut, Dent, Terms,
-    ]  # fmt: skip
+    return list_rules()
 
 
 @hookimpl

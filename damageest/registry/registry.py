@@ -23,10 +23,10 @@ from damageest.registry.loading import OWN, Broken, Provider, describe_broken, i
 from damageest.result import Conversion
 from damageest.rules import RULE_FAILED, Rule
 from damageest.rules.notes import RUN_CODES
-from damageest.rules.pose import POSE_CODES
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
 from damageest.stages.export import PathWriter, Writer
+from damageest.trust.doubts.pose import POSE_CODES
 
 Kind = TypeVar("Kind", Writer, PathWriter)
 RESERVED = frozenset((*RUN_CODES, *POSE_CODES, *STAGES, RULE_FAILED))

@@ -7,10 +7,12 @@ refusal has the word of its topic as an attribute of the error.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from damageest.rules.notes import RUN_CODES
+from damageest.trust.doubt import Rule
+from damageest.trust.doubts import list_rules
 
 if TYPE_CHECKING:
     from damageest.result import Result
@@ -21,8 +23,8 @@ MOST_NAMED = 3
 
 @dataclass(frozen=True)
 class Topic:
-    """``word`` names it, ``title`` is its heading on the page. ``codes``: of the reasons that belong to it. ``text``:
-    what to do. ``job``: lines of a job for it; empty where there are none."""
+    """``word`` names it, ``title`` is its heading on the page. ``codes``: of the reasons that belong to it; rules name
+    their topic themselves. ``text``: what to do. ``job``: lines of a job for it; empty where there are none."""
 
     word: str
     title: str
@@ -37,7 +39,7 @@ class Topic:
         return f"docs/bad-scan.md#{words.replace(' ', '-')}"
 
 
-TOPICS = (
+ADVICE = (
     Topic(
         "unit",
         "The unit is wrong",
@@ -63,7 +65,7 @@ TOPICS = (
     Topic(
         "pose",
         "The pose is not certain",
-        ("align", "pose", "another_part", "other_poses", "pose_free", "mirrored", "given_pose"),
+        ("align", "another_part", "other_poses", "pose_free", "mirrored", "given_pose"),
         "Open report.html and see whether the scan lies on the part. Scan faces in three directions, and features "
         "that break the symmetry, such as a keyway. On a symmetric part the volume is right in each pose, but the "
         "machine has to use the same one. Where the pose is wrong, pick three or more pairs of points, each first "
@@ -73,7 +75,7 @@ TOPICS = (
     Topic(
         "noise",
         "The noise is large for the tolerance",
-        ("tolerance_small", "tolerance_raised", "below_noise", "depth_steps", "thin_walls", "scattered", "fading"),
+        ("tolerance_small", "tolerance_raised", "below_noise", "depth_steps", "thin_walls"),
         "Take tolerance: auto, or four times the noise that the run prints. This scan cannot show a shallower "
         "loss: scan from nearer, with more exposures, or with a better scanner. Do not smooth the scan: that "
         "rounds the rims of the damage and hides the noise from the check.",
@@ -82,7 +84,7 @@ TOPICS = (
     Topic(
         "sparse",
         "The points are too few",
-        ("few_points", "sparse_scan", "beyond_points"),
+        ("sparse_scan",),
         "Export the scan at full resolution, as points or as a mesh that was not decimated: only the vertices of a "
         "mesh are used. Three to five points should lie across the smallest damage that matters. Scan thin places "
         "again and give all files as a list.",
@@ -91,7 +93,7 @@ TOPICS = (
     Topic(
         "unseen",
         "The scan has holes and shadows",
-        ("inner_surface", "beside", "not_visible"),
+        (),
         "Open unseen.ply over the CAD model, turn the part, and scan these places, above all into the damage and "
         "beside it. Give the position of the scanner for each view: rays then tell empty space from unseen space. "
         "Do not fill holes in the scanner's software: a filled hole looks like metal.",
@@ -100,7 +102,7 @@ TOPICS = (
     Topic(
         "views",
         "The views do not fit together",
-        ("two_sheets", "one_motion", "misplaced_view"),
+        (),
         "Register the views to each other again. Or give each view as its own file with the position of its "
         "scanner: align: register then corrects each view that fixes its own pose. Views in one file are told "
         "apart only where they follow each other in it. To find the wrong view, run each alone.",
@@ -121,7 +123,7 @@ TOPICS = (
     Topic(
         "form",
         "The part is bent, or the scan is scaled",
-        ("model_fit", "adapt", "adapted_skin"),
+        ("model_fit", "adapt"),
         "Measure one length of the part and compare it with the scan. If the scan is wrong, correct its scale. If "
         "the part is bent or twisted, adapt: auto, the default, bends the CAD model until it follows the intact "
         "skin. Colour scan.ply by distance: the rest should be even noise, without bands.",
@@ -130,7 +132,7 @@ TOPICS = (
     Topic(
         "wear",
         "A whole face is worn",
-        ("free_pose", "wide_loss"),
+        (),
         "Name unworn faces, such as journals, a foot or end faces: only they fix the pose then. `damageest faces` "
         "lists the faces of a STEP file. Where a fixture gives the pose, take align: none.",
         "align:\n  use: register\n  datum: [{facing: {direction: [0, 0, -1], angle: 5}}]",
@@ -138,7 +140,7 @@ TOPICS = (
     Topic(
         "surplus",
         "Metal or dirt lies on the part",
-        ("covered", "displaced", "displaced_piece", "revision", "surplus"),
+        ("displaced_piece", "surplus"),
         "Remove weld beads, spatter or dirt from the damage, and scan again: a loss below them cannot be seen. A "
         "displaced piece is no loss: put it back, or accept the site to repair it as if the piece were lost. "
         "Surplus elsewhere changes no volume.",
@@ -147,13 +149,24 @@ TOPICS = (
     Topic(
         "doubtful",
         "A site is doubtful, or its interval is wide",
-        ("nothing", "wide_interval", "off_boundary", "intact_inside", "intact_over", "other_method"),
+        (),
         "Read its reasons in the report and look at the place on the part. If the metal is missing there, accept "
         "the site by its number; if not, drop it. A better scan of this place makes the interval narrower. A "
         "larger tolerance removes shallow sites that are errors of the scan.",
         "accept: [3, 5] # these doubtful sites beside the likely ones\nsites: {drop: [2]}",
     ),
 )
+
+
+def make_topics(rules: Iterable[Rule | type[Rule]]) -> tuple[Topic, ...]:
+    """The topics with the codes of the rules that belong to them."""
+    codes = [(rule.topic, rule.code) for rule in rules]
+    return tuple(
+        replace(one, codes=(*one.codes, *(code for word, code in codes if word == one.word))) for one in ADVICE
+    )
+
+
+TOPICS = make_topics(list_rules())
 
 
 def find_topic(word: str) -> Topic | None:

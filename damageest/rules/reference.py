@@ -6,7 +6,7 @@ from collections.abc import Iterable
 
 from damageest.rules import RULE_FAILED, Rule
 from damageest.rules.notes import RUN_CODES
-from damageest.rules.pose import POSE_CODES
+from damageest.trust.doubts.pose import POSE_CODES
 
 
 def format_reasons(rules: Iterable[Rule]) -> str:

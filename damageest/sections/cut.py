@@ -8,9 +8,9 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest.artefacts.sections import SectionContour
-from damageest.checks.interval.pose_error import PoseError
 from damageest.sections.contour import WINDOW, FlatScan, Loop
 from damageest.sections.planes import Place
+from damageest.trust.interval.pose_error import PoseError
 
 FORM_WAVE = 0.03
 """Length of a wave of form, in outlines: form that a fit leaves pulls it as errors do that such a piece shares."""

@@ -9,7 +9,6 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh
 from damageest.artefacts.sections import Section, SectionContour, SectionValue
-from damageest.checks.interval.pose_error import PoseError
 from damageest.job.sections import SectionChoice
 from damageest.sections.blade import is_blade, measure_blade
 from damageest.sections.blade_values import measure_as_blade
@@ -27,6 +26,7 @@ from damageest.sections.cut import Cut, sum_errors
 from damageest.sections.line import measure_line
 from damageest.sections.planes import Place, list_places
 from damageest.sections.round_values import measure_as_round
+from damageest.trust.interval.pose_error import PoseError
 
 REACH = 0.1
 """Largest distance of scan points outside the outlines that are compared, in the longest side of the section."""

@@ -19,7 +19,7 @@ SCRIPT = """
 import ctypes, json, sys
 import numpy as np, scipy.fft, scipy.sparse.csgraph, scipy.spatial, trimesh
 from damageest.artefacts import DAMAGE, INTACT, Deviation, Mesh, Part, Scan, Sites
-from damageest.checks.skin import skin_cells
+from damageest.trust.skin import skin_cells
 from damageest.geometry import distance, distance_by_cells, local_fits, neighbourhoods, poisson, refinement
 from damageest.stages.cluster import _density
 from damageest.geometry import spreading as _spread

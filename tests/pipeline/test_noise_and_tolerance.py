@@ -10,11 +10,11 @@ from damageest_benchmarks.parts import PARTS
 
 import damageest
 from damageest.artefacts import Deviation, Sites
-from damageest.checks.scan_quality import require_real_clusters
 from damageest.errors import InputError
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.registry import Registry
 from damageest.stages.scan.simulate import Simulate
+from damageest.trust.scan_quality import require_real_clusters
 from tests.pipeline.halfway import run_until
 
 

@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 import damageest
-from damageest.checks.interval.site_error import SiteError, combine_total
+from damageest.trust.interval.site_error import SiteError, combine_total
 from tests.geometry.shapes import ball, box
 from tests.scenes import spread
 

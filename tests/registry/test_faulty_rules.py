@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from damageest.artefacts import Evidence
-from damageest.checks.verdict import apply_rules, decide
 from damageest.cli._trials import try_plugins
 from damageest.registry import Registry
 from damageest.rules import ScanFacts, SiteFacts
+from damageest.trust.verdict import apply_rules, decide
 from tests.registry.test_registry import Site, site
 
 __all__ = ["site"]

@@ -11,10 +11,10 @@ import pytest
 from ruamel.yaml import YAML
 
 from damageest.artefacts import Evidence, Reason
-from damageest.checks.verdict import apply_rules, apply_to_sites, decide, open_end
 from damageest.findings import Fading, Uncertainty
 from damageest.registry import Registry
 from damageest.rules import FreePose, Rule, ScanFacts, SiteFacts
+from damageest.trust.verdict import apply_rules, apply_to_sites, decide, open_end
 
 CASES: dict[str, list[dict[str, Any]]] = YAML(typ="safe").load((Path(__file__).parent / "cases.yaml").read_text())
 VOLUME = 20.0

@@ -5,17 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 
 from damageest.artefacts import DAMAGE, INTACT, Deviation
-from damageest.checks.scan_quality import require_intact
-from damageest.checks.skin.coverage import SkinView, measure_coverage
-from damageest.checks.skin.facing import find_turned
-from damageest.checks.skin.ray_evidence import trace_rays
-from damageest.checks.skin.skin_cells import cut_skin, find_seen
 from damageest.errors import StageError
 from damageest.findings import Coverage
 from damageest.geometry.scan_field import ScanField
 from damageest.pipeline.state import FoundSite
 from damageest.pipeline.steps import step
 from damageest.stages.segment import Segment
+from damageest.trust.scan_quality import require_intact
+from damageest.trust.skin.coverage import SkinView, measure_coverage
+from damageest.trust.skin.facing import find_turned
+from damageest.trust.skin.ray_evidence import trace_rays
+from damageest.trust.skin.skin_cells import cut_skin, find_seen
 
 
 @step(gives=("skin", "deviation"))

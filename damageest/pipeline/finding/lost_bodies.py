@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Evidence, Part, Solid
-from damageest.checks.skin.coverage import SkinView
 from damageest.geometry.bodies import label_pieces
 from damageest.pipeline.state import FoundSite
+from damageest.trust.skin.coverage import SkinView
 
 BY_RAYS_ALONE = "rays"
 """The method of a site without scan points on it."""

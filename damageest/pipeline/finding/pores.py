@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Ints, Solid, Surface, open_edges
-from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.state import Candidate, Failures, FoundSite, JobState
 from damageest.stages.boundary import Boundary
 from damageest.stages.reconstruct import Reconstruct
+from damageest.trust.evidence import weigh_evidence
 
 PORE = "pore"
 """The method of a site that is a pore."""

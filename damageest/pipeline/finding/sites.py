@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Enclosures, Floats, Ints, Reason, Scan, Sites
-from damageest.checks.evidence import weigh_evidence
 from damageest.errors import StageError
 from damageest.geometry.pieces import find_pieces, join_pieces
 from damageest.geometry.scan_field import ScanField
@@ -20,6 +19,7 @@ from damageest.pipeline.steps import step
 from damageest.registry.contracts import Contract
 from damageest.stages.enclose import Enclose, EncloseAll
 from damageest.stages.reconstruct import Reconstruct
+from damageest.trust.evidence import weigh_evidence
 
 SPECK = 50
 """Points of a cluster below which a failure to enclose it is a warning and not a failure of the run."""

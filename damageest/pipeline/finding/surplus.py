@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, Deviation, Floats, Reason, Sites
-from damageest.checks.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
-from damageest.checks.views.two_sheets import FARTHEST
 from damageest.errors import DamageestError, StageError
 from damageest.findings import Surplus
 from damageest.geometry.alike import have_same_shape
@@ -23,9 +21,10 @@ from damageest.pipeline.finding.sites import find_place
 from damageest.pipeline.placing.skin_points import sample_near_damage
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.rules.two_sheets import EXPLAINED, OF_SCAN
 from damageest.stages.cluster import Cluster
 from damageest.stages.enclose import EncloseAll
+from damageest.trust.surplus import close_surplus, compare_with_losses, describe_surplus, join_surplus
+from damageest.trust.views.two_sheets import EXPLAINED, FARTHEST
 
 MARGIN = 80.0
 """Distance in tolerances between the surplus and the sides of the complement's box; more than an enclosure needs."""
@@ -180,7 +179,7 @@ def _choose_layer(state: JobState, found: tuple[Surplus, ...]) -> float:
     """Height below which a surplus is a layer. Where views lie apart, one of them is up to that far outside the skin,
     over much of it: to close such layers costs more than all the rest of a run."""
     layer, sheets = SHALLOW * state.tolerance, state.sheets
-    if sheets.share <= OF_SCAN or not any(layer <= item.height < FARTHEST * state.tolerance for item in found):
+    if not sheets.disagree or not any(layer <= item.height < FARTHEST * state.tolerance for item in found):
         return layer
     return max(layer, EXPLAINED * sheets.apart)
 

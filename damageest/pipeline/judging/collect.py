@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import ADDED, DAMAGE, OUTLIER, Deposit, Floats, Pose, Scan, Solid
-from damageest.checks.interval.budget import UNKNOWN
 from damageest.geometry.remaining import subtract_from_part
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import extract_ids
@@ -21,6 +20,7 @@ from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.result import Result, Site
 from damageest.rules.notes import make_notes, rank_notes
+from damageest.trust.interval.budget import UNKNOWN
 
 
 @step(

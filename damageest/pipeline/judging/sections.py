@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Mesh, Reason, Section
-from damageest.checks.interval.pose_error import PoseError
 from damageest.findings import Sensor
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.transforms import move_points
@@ -13,6 +12,7 @@ from damageest.job.sections import SectionChoice
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.sections.measure import Scanned, measure_sections
+from damageest.trust.interval.pose_error import PoseError
 
 
 @step(gives=("sections", "warnings"))

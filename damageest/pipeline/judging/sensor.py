@@ -7,10 +7,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import DAMAGE, OUTLIER, Ints, Pose, Reason, Sites
-from damageest.checks.interval.pose_error import PoseError, measure_pose_error
-from damageest.checks.interval.semivariogram import measure_semivariogram
-from damageest.checks.interval.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
-from damageest.checks.views.two_sheets import Sheets, measure_sheets, measure_two_sheets
 from damageest.findings import Explained, Sensor
 from damageest.geometry.scan_field import ScanField
 from damageest.job.model import Accept
@@ -19,9 +15,12 @@ from damageest.pipeline.placing.datums import choose_on_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import ScanFacts
-from damageest.rules.misplaced_view import AGAINST
-from damageest.rules.two_sheets import EXPLAINED, OF_SCAN, explains
 from damageest.stages.align import Align
+from damageest.trust.doubts.misplaced_view import AGAINST
+from damageest.trust.interval.pose_error import PoseError, measure_pose_error
+from damageest.trust.interval.semivariogram import measure_semivariogram
+from damageest.trust.interval.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
+from damageest.trust.views.two_sheets import EXPLAINED, Sheets, measure_sheets, measure_two_sheets
 
 HIDES = 1.2
 """How many times larger than the tolerance the least depth that can be seen has to be, for shallower sites that are
@@ -68,7 +67,7 @@ def dismiss_explained_clusters(state: JobState) -> tuple[Sites, Explained]:
     """Takes clusters of points that views which lie apart explain for no sites: their verdict would be doubtful,
     whatever their volume is. What is deeper than the views explain stays, and what the job accepts by number."""
     field, sites, views, sheets = state.field, state.sites, state.views, state.sheets
-    is_apart = sheets.share > OF_SCAN or (views is not None and views.disagree)
+    is_apart = sheets.disagree or (views is not None and views.disagree)
     if not is_apart or not _is_folding(state.aligner, state.accept):
         return sites, Explained()
     apart = max([sheets.apart, *(one.apart for one in (views.views if views else ()))])
@@ -80,7 +79,7 @@ def dismiss_explained_clusters(state: JobState) -> tuple[Sites, Explained]:
         if not len(depth) or np.quantile(depth, DEEPEST) > most or np.count_nonzero(depth > most) >= NEEDED:
             continue
         own = measure_two_sheets(field, members)
-        if explains(own, float(np.median(depth)), *sheets) or (
+        if sheets.explain(own, float(np.median(depth))) or (
             views is not None and views.find_explained(field, members) > AGAINST
         ):
             gone.append(number)

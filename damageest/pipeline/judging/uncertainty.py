@@ -9,26 +9,6 @@ from functools import cached_property
 import numpy as np
 
 from damageest.artefacts import Flags, Ints, Solid
-from damageest.checks.beyond_points import measure_beyond_points
-from damageest.checks.dent import find_bent_wall
-from damageest.checks.interval.budget import make_depth_budget, make_volume_budget
-from damageest.checks.interval.fading import measure_fading
-from damageest.checks.interval.free_pose import measure_dependence, measure_hidden_wear
-from damageest.checks.interval.inner_surface import measure_inner_surface
-from damageest.checks.interval.pose_error import PoseError
-from damageest.checks.interval.shallow_loss import limit_shallow_loss
-from damageest.checks.interval.site_error import (
-    WIDTH,
-    SiteError,
-    combine_site,
-    combine_total,
-    measure_certain,
-    sum_free,
-)
-from damageest.checks.interval.uncertainty import Loss, ScanErrors, limit_beside, measure_shifts, measure_site_error
-from damageest.checks.scan_quality import describe_few
-from damageest.checks.skin.coverage import find_removed_cells
-from damageest.checks.views.view_overlap import compare_at_site
 from damageest.findings import Budget, Fading, Interval, Uncertainty
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces
@@ -39,6 +19,26 @@ from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.stages.adapt import Adapt
 from damageest.stages.allowance import Allowance
+from damageest.trust.beyond_points import measure_beyond_points
+from damageest.trust.doubts.dent import find_bent_wall
+from damageest.trust.interval.budget import make_depth_budget, make_volume_budget
+from damageest.trust.interval.fading import measure_fading
+from damageest.trust.interval.free_pose import measure_dependence, measure_hidden_wear
+from damageest.trust.interval.inner_surface import measure_inner_surface
+from damageest.trust.interval.pose_error import PoseError
+from damageest.trust.interval.shallow_loss import limit_shallow_loss
+from damageest.trust.interval.site_error import (
+    WIDTH,
+    SiteError,
+    combine_site,
+    combine_total,
+    measure_certain,
+    sum_free,
+)
+from damageest.trust.interval.uncertainty import Loss, ScanErrors, limit_beside, measure_shifts, measure_site_error
+from damageest.trust.scan_quality import describe_few
+from damageest.trust.skin.coverage import find_removed_cells
+from damageest.trust.views.view_overlap import compare_at_site
 
 COARSE = 0.05
 """Point spacing, in diagonals of the part, from which a loss between the points can be of any size."""

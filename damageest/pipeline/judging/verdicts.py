@@ -8,16 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Reason
-from damageest.checks.elsewhere import measure_elsewhere
-from damageest.checks.evidence import weigh_evidence
-from damageest.checks.interval.free_pose import compare_other_poses, describe_motion
-from damageest.checks.scan_facts import gather_scan_facts
-from damageest.checks.skin.coverage import SkinView, find_removed_cells
-from damageest.checks.skin.unseen_rim import measure_unseen_rim
-from damageest.checks.skin.visibility import measure_visibility
-from damageest.checks.verdict import apply_to_sites, decide, open_end
-from damageest.checks.views.one_motion import are_sound, is_one_motion
-from damageest.checks.views.two_sheets import measure_two_sheets
 from damageest.errors import StageError
 from damageest.findings import Level
 from damageest.geometry.scan_field import ScanField
@@ -29,8 +19,13 @@ from damageest.pipeline.finding.sites import number_sites
 from damageest.pipeline.placing.datums import choose_on_datums, has_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.rules import FreePose, ScanFacts, SiteFacts
-from damageest.rules.scattered import ALIKE, SHALLOW
+from damageest.rules import FreePose, ScanFacts, SiteCase, SiteFacts
+from damageest.trust.doubts.one_motion import are_sound
+from damageest.trust.evidence import weigh_evidence
+from damageest.trust.interval.free_pose import describe_motion
+from damageest.trust.scan_facts import gather_scan_facts
+from damageest.trust.skin.coverage import SkinView, find_removed_cells
+from damageest.trust.verdict import apply_to_sites, compare_sites, decide, measure_facts, open_end
 
 BY_RAYS = 0.5
 """Share of a site's unseen skin that rays have to have passed through, for the loss to be proven by them."""
@@ -113,9 +108,7 @@ def _gather_all_facts(state: JobState) -> list[SiteFacts]:
     """The facts of each site, with what the others say about it."""
     held = bool(state.found) and _is_held_by_datums(state)
     each = [_gather_site_facts(state, site, held) for site in state.found]
-    shifted = max((one.typical for one in each if one.one_motion), default=0.0)
-    waves = [one.volume for one in each if one.count and one.deepest < SHALLOW * state.field.tolerance]
-    return [replace(one, shifted=shifted, shallow=sum(v >= ALIKE * one.volume for v in waves)) for one in each]
+    return compare_sites(state.rules, each, state.facts)
 
 
 def _is_held_by_datums(state: JobState) -> bool:
@@ -133,8 +126,7 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
     field, members = state.field, site.members
     depth, points = -field.distance[members], field.points
     typical, deepest = (float(np.quantile(depth, q)) for q in (0.5, 0.95)) if len(depth) else (0.0, 0.0)
-    visible = measure_visibility(site.damage, field, points[members])
-    return SiteFacts(
+    facts = SiteFacts(
         volume=site.damage.volume,
         area=measure_area(points[members], state.skin.cells.edge) if len(depth) else 0.0,
         damage_area=site.damage.area,
@@ -145,16 +137,6 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         interval=site.uncertainty.volume_95 if site.uncertainty else None,
         uncertainty=site.uncertainty,
         by_rays=_is_proven_by_rays(state.skin, site),
-        rim_unseen=measure_unseen_rim(
-            site.damage, field.part, state.coverage, 2 * max(field.tolerance, field.aligned.spacing)
-        ),
-        two_sheets=measure_two_sheets(field, members, site.damage),
-        misplaced=0.0 if state.views is None else state.views.find_explained(field, members),
-        one_motion=not held and is_one_motion(field, members),
-        elsewhere=measure_elsewhere(field, members, state.skin, find_removed_cells(site.damage, state.skin))
-        if state.facts.is_fitted
-        else 0.0,
-        other_poses=compare_other_poses(site.damage, field.part, state.pose, field.tolerance),
         free=tuple(
             FreePose(describe_motion(one.motion, state.unit), *one.ends, one.moved * one.reach)
             for one in site.dependences
@@ -165,10 +147,10 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         covered=site.covered,
         beyond=site.beyond.amount,
         beyond_words=site.beyond.reason,
-        shut=visible.shut,
-        turned=visible.turned,
         other_volume=site.other_volume,
     )
+    case = SiteCase(site.damage, members, field, state.facts, state.skin, state.coverage, state.pose, state.views, held)
+    return measure_facts(state.rules, case, facts)
 
 
 def _check_numbers(field: str, numbers: Iterable[int], sites: tuple[FoundSite, ...]) -> None:

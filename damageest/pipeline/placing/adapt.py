@@ -8,8 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples
-from damageest.checks.model_fit import AskedFit, measure_fit
-from damageest.checks.views.two_sheets import measure_sheets
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
@@ -21,10 +19,11 @@ from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
-from damageest.rules.two_sheets import OF_SCAN
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.sample import Sample
+from damageest.trust.model_fit import AskedFit, measure_fit
+from damageest.trust.views.two_sheets import measure_sheets
 
 AGREES = 0.72
 """Share of the scan near the part that has to lie on the adapted skin, for it to show this part: as stage align asks
@@ -122,7 +121,7 @@ def find_deformation(state: JobState) -> tuple[AskedFit, bool]:
     if found is None or found.fit.model not in ASKING:
         return asked, False
     sheets = measure_sheets(field)
-    if sheets.share <= OF_SCAN or not len(some.points):
+    if not sheets.disagree or not len(some.points):
         return asked, True
     form = np.quantile(np.abs(found.predict(some.points, state.part.face_normals[field.deviation.face])), 0.9)
     return asked, bool(form > BEYOND_VIEWS * sheets.apart)

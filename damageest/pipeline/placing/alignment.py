@@ -5,7 +5,6 @@ from __future__ import annotations
 from contextlib import suppress
 
 from damageest.artefacts import Part, Pose, Scan
-from damageest.checks.scan_quality import raise_tolerance, require_above_noise, require_tolerance, require_walls
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.noise import AUTO_TOLERANCE
@@ -19,6 +18,7 @@ from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
+from damageest.trust.scan_quality import raise_tolerance, require_above_noise, require_tolerance, require_walls
 
 COARSE = 4.0
 """How many tolerances a deformed part may lie off the part as designed, for its pose to be found."""

@@ -10,12 +10,6 @@ from typing import overload
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Flags, Floats, Ints, Pose, Reason, Scan
-from damageest.checks.fit_doubts import find_fit_doubts
-from damageest.checks.form.form_words import describe_fit, describe_view_of
-from damageest.checks.model_fit import AskedFit, FittedModel, measure_fit
-from damageest.checks.scan_quality import choose_tolerance
-from damageest.checks.views.view_fit import ViewFits, fit_views
-from damageest.checks.views.view_split import separate_views
 from damageest.errors import StageError
 from damageest.findings import Surplus
 from damageest.geometry.distance import signed_distance
@@ -33,6 +27,12 @@ from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
 from damageest.stages.align import Align
 from damageest.stages.scan import ReadScan
+from damageest.trust.fit_doubts import find_fit_doubts
+from damageest.trust.form.form_words import describe_fit, describe_view_of
+from damageest.trust.model_fit import AskedFit, FittedModel, measure_fit
+from damageest.trust.scan_quality import choose_tolerance
+from damageest.trust.views.view_fit import ViewFits, fit_views
+from damageest.trust.views.view_split import separate_views
 
 MEASURED = 40_000
 """Points, about, that the scale is measured with before it is corrected."""

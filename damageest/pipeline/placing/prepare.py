@@ -9,13 +9,6 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Part, Pose, Reason, Scan, Sites
-from damageest.checks.scan_quality import (
-    check_walls,
-    choose_tolerance,
-    describe_few,
-    raise_tolerance,
-    require_real_clusters,
-)
 from damageest.errors import DamageestError, InputError
 from damageest.geometry.crops import crop_points
 from damageest.geometry.depth_steps import measure_depth_step
@@ -38,6 +31,13 @@ from damageest.registry.registry import Registry
 from damageest.stages.align import Align
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
+from damageest.trust.scan_quality import (
+    check_walls,
+    choose_tolerance,
+    describe_few,
+    raise_tolerance,
+    require_real_clusters,
+)
 
 COMPARED = 20_000
 """Points that the tolerance is chosen from after the alignment."""

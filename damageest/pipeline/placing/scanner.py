@@ -7,16 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from damageest.artefacts import Floats, Part, Reason, Scan
-from damageest.checks.interval.pose_error import PoseError
-from damageest.checks.interval.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
-from damageest.checks.interval.site_error import WIDTH
-from damageest.checks.model_fit import FittedModel
 from damageest.geometry.scan_field import ScanField
 from damageest.job.scanner import Certificate, ScannerInfo, Temperature
 from damageest.pipeline.placing.form import divide_scan
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import ScanFacts
+from damageest.trust.interval.pose_error import PoseError
+from damageest.trust.interval.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
+from damageest.trust.interval.site_error import WIDTH
+from damageest.trust.model_fit import FittedModel
 
 FAR = 1.5
 """How many times larger than the certificate says the noise has to be, to contradict it."""

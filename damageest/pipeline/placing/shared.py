@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 from damageest.artefacts import Part, Reason, Scan
-from damageest.checks.skin.shared_skin import find_unshared
 from damageest.errors import StageError
 from damageest.pipeline.state import Reasons
+from damageest.trust.skin.shared_skin import find_unshared
 
 FEWEST = 100
 """Points on skin that both scans show, below which nothing can be compared."""

@@ -9,7 +9,6 @@ from typing import Any
 
 from damageest import read_inputs, read_part
 from damageest.artefacts import Part
-from damageest.checks.scan_quality import choose_tolerance
 from damageest.errors import InputError
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.io.digests import digest
@@ -20,6 +19,7 @@ from damageest.stages.align import Align
 from damageest.stages.part import ReadPart
 from damageest.stages.scan import ReadScan
 from damageest.stages.scan.simulate import Simulate
+from damageest.trust.scan_quality import choose_tolerance
 from damageest_evaluate.case import DamageCase, save_part
 from damageest_evaluate.damages import KINDS
 from damageest_evaluate.sized import SIZED

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from damageest.artefacts import Solid
-from damageest.checks.interval.site_error import SiteError, combine_total
 from damageest.stages.adapt._basis import Basis
 from damageest.stages.adapt._body import spread_evenly
 from damageest.stages.adapt._choose import Score, Trial
 from damageest.stages.adapt._field import Field, Freedom
 from damageest.stages.adapt._other import find_other, find_thinned
+from damageest.trust.interval.site_error import SiteError, combine_total
 from tests import damaged_box
 from tests.stages.adapt.test_smooth import TOLERANCE, adapt
 

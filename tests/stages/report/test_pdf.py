@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 
 import damageest
-from damageest.checks.interval import budget
 from damageest.errors import JobError
 from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.report._words import FOLDER, Words, list_languages
+from damageest.trust.interval import budget
 from tests import damaged_box
 from tests.needs import import_or_skip
 
