@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property, partial
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,9 +15,7 @@ from numpy.typing import NDArray
 from damageest.artefacts import (
     AdaptedPart,
     Deposit,
-    DepositPath,
     Deviation,
-    Evidence,
     Floats,
     Mesh,
     Part,
@@ -26,84 +24,14 @@ from damageest.artefacts import (
     Scan,
     Section,
     Solid,
-    Surface,
 )
 from damageest.errors import InputError
-from damageest.findings import Budget, Coverage, Fading, Interval, ModelFit, Sensor, Surplus, Uncertainty, Verdict
+from damageest.findings import Coverage, ModelFit, Sensor, Surplus
 from damageest.geometry.transforms import invert_pose
+from damageest.intervals import Budget, Interval
 from damageest.io.conversions import as_manifold, as_trimesh
-
-
-@dataclass(frozen=True, eq=False)
-class Site:
-    """One damage: ``damage`` (DV) and ``surface`` (IDS) in the part's frame; ``deposit`` None where it is the DV.
-
-    After a cut-back alone, DV and IDS are those of the enlarged cavity. ``refused``: the stage `allowance` failed, and
-    there is no deposit. ``clusters``: the numbers of the point clusters that bound it; ``points`` (M,) indices into the
-    scan; ``max_depth``: the farthest of them below the lost skin. ``accepted``: whether the site is part of
-    `Result.damage`; a doubtful one is where the job accepts it. ``volume_rates``: change of the DV's volume for each
-    unit of each motion of `Pose.free`. ``enclosures``: the closed surfaces that cut the DV out of the part; none where
-    that is a whole body of the part. ``path``: the passes that build up the deposit; None where the job asks for none,
-    or none could be planned.
-    """
-
-    id: int
-    clusters: tuple[int, ...]
-    points: NDArray[np.int64]
-    damage: Solid
-    surface: Surface
-    deposit: Solid | None
-    method: str
-    evidence: Evidence
-    max_depth: float
-    warnings: tuple[Reason, ...] = ()
-    refused: bool = False
-    verdict: Verdict = field(default_factory=Verdict)
-    accepted: bool = True
-    volume_rates: tuple[float, ...] = ()
-    uncertainty: Uncertainty | None = None
-    enclosures: tuple[Solid, ...] = ()
-    path: DepositPath | None = None
-
-    @property
-    def volume_95(self) -> Interval | None:
-        """The 95 % interval of the volume of ``damage``; None where the scan does not support one."""
-        return self.uncertainty.volume_95 if self.uncertainty else None
-
-    @property
-    def depth_95(self) -> Interval | None:
-        """The 95 % interval of the largest depth of the loss, which ``max_depth``, of single points, exceeds by noise;
-        None where the scan does not support one."""
-        return self.uncertainty.depth_95 if self.uncertainty else None
-
-    @property
-    def fading(self) -> Fading | None:
-        """How a shallow loss fades out; None for a loss with a sharp rim."""
-        return self.uncertainty.fading if self.uncertainty else None
-
-    @cached_property
-    def centroid(self) -> Floats:
-        """(3,) centre of mass of the damage volume."""
-        centre = self.damage.bounds.mean(0)
-        corners = self.damage.triangles - centre
-        weights = np.einsum("ij,ij->i", corners[:, 0], np.cross(corners[:, 1], corners[:, 2]))
-        moment = (weights[:, None] * corners.sum(1)).sum(0) / (4 * weights.sum())
-        return np.asarray(centre + moment)
-
-    def mesh(self, what: Literal["damage", "surface", "deposit"]) -> Mesh:
-        """The DV, the IDS, or the deposit, which is the DV without an allowance. Raises ValueError."""
-        if what == "deposit" and self.refused:
-            raise ValueError(f"site {self.id} has no deposit: the stage allowance refused it; see Result.failures")
-        found = {"damage": self.damage, "surface": self.surface, "deposit": self.deposit or self.damage}
-        return _choose_mesh(found, what, f"site {self.id}")
-
-    def as_trimesh(self, what: Literal["damage", "surface", "deposit"] = "damage") -> Any:
-        """A ``trimesh.Trimesh`` in the part's frame; see `mesh`."""
-        return as_trimesh(self.mesh(what))
-
-    def as_manifold(self, what: Literal["damage", "deposit"] = "damage") -> Any:
-        """A ``manifold3d.Manifold`` in the part's frame; see `mesh`."""
-        return as_manifold(_require_solid(self.mesh(what), what))
+from damageest.site import Site as Site
+from damageest.site import choose_mesh, require_solid
 
 
 @dataclass(frozen=True)
@@ -149,14 +77,12 @@ class Result:
     ``tolerance``: the lambda that was used, in ``units``, also where the job says `auto`. ``pose.T_part_scan`` (4,4)
     takes a point from the scanner's frame to the part's: x_part = R x_scan + t; ``aligned`` is the scan moved by it.
     ``site_label`` (N,) int32 gives each scan point's site, 0 for none. ``damage`` is the union of the DVs of all
-    accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``failures`` say which
-    sites have no DV or no deposit and why: then ``status`` is ``incomplete``. ``volume_95``: the 95 % interval of the
-    volume of ``damage``; None where one of its sites has none. Doubtful sites that are no part of ``damage`` are in its
-    high end. ``budget``: the uncertainty of that volume, source by source; ``not_in_budget``: names of sources that the
-    job does not give; ``certificate``: scanner and standard by the job. ``adapted``: deformation of ``part`` to follow
-    the scan; None: it is the part as designed. ``sections``: the job's sections, of the part as designed, in the pose
-    of the run. ``conversions``: conversions by plugins, see `convert`. ``scan_factor``: divisor of the lengths of
-    ``scan``, for temperature and scale, about ``scan_centre`` (3,); see `transform_to_scan` and `raw_points`.
+    accepted sites and ``undamaged`` the part without them; None where nothing is left or lost. ``volume_95``: None
+    where a site of ``damage`` has none; doubtful sites that are no part of ``damage`` are in its high end. ``adapted``:
+    deformation of ``part`` to follow the scan; None: it is the part as designed. ``sections``: of the part as designed,
+    in the pose of the run. ``conversions``: conversions by plugins, see `convert`. ``scan_factor``: divisor of the
+    lengths of ``scan``, for temperature and scale, about ``scan_centre`` (3,); see `transform_to_scan` and
+    `raw_points`.
     """
 
     name: str
@@ -171,21 +97,27 @@ class Result:
     sites: tuple[Site, ...]
     damage: Solid | None
     undamaged: Solid | None
-    warnings: tuple[Reason, ...]
-    failures: tuple[str, ...]
+    warnings: Annotated[tuple[Reason, ...], "notes on the whole run, most important first"]
+    failures: Annotated[tuple[str, ...], "sites without a damage volume or a deposit, and why"]
     truth: Floats | None
     stages: tuple[StageRecord, ...] = ()
-    steps: tuple[StepRecord, ...] = ()
+    steps: Annotated[tuple[StepRecord, ...], "steps between the stages, up to the report"] = ()
     coverage: Coverage | None = None
-    surplus: tuple[Surplus, ...] = ()
-    fit: ModelFit | None = None
+    surplus: Annotated[tuple[Surplus, ...], "bodies outside the nominal surface, surroundings last"] = ()
+    fit: Annotated[ModelFit | None, "null where too few points lie near the skin"] = None
     adapted: AdaptedPart | None = None
-    sensor: Sensor | None = None
-    volume_95: Interval | None = None
-    budget: Budget | None = None
-    not_in_budget: tuple[str, ...] = ()
-    certificate: str = ""
-    sections: tuple[Section, ...] = ()
+    sensor: Annotated[Sensor | None, "null where nothing was measured"] = None
+    volume_95: Annotated[
+        Interval | None,
+        "95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none",
+    ] = None
+    budget: Annotated[
+        Budget | None,
+        "budget of uncertainty of `damage_volume` (JCGM 100); null where there is no interval or no site",
+    ] = None
+    not_in_budget: Annotated[tuple[str, ...], "sources that the job does not give: not included in any interval"] = ()
+    certificate: Annotated[str, "scanner and standard of its certificate; empty where the job has none"] = ""
+    sections: Annotated[tuple[Section, ...], "sections of the job"] = ()
     conversions: Mapping[str, Conversion] = field(default_factory=dict, repr=False)
     scan_factor: float = 1.0
     scan_centre: Floats | None = None
@@ -197,6 +129,7 @@ class Result:
 
     @property
     def status(self) -> Literal["ok", "incomplete"]:
+        """Incomplete: some sites have no damage volume or deposit."""
         return "incomplete" if self.failures else "ok"
 
     @property
@@ -240,7 +173,7 @@ class Result:
             return self._find_surplus(site)
         if site is None:
             found = {"part": self.part, "damage": self.damage, "undamaged": self.undamaged}
-            return _choose_mesh(found, what, "the result")
+            return choose_mesh(found, what, "the result")
         own = next((each for each in self.sites if each.id == site), None)
         if own is None:
             raise ValueError(
@@ -263,7 +196,7 @@ class Result:
 
     def as_manifold(self, what: str, site: int | None = None, frame: Literal["part", "scan"] = "part") -> Any:
         """A ``manifold3d.Manifold`` in the part's frame or the scanner's; see `mesh`."""
-        return as_manifold(_require_solid(self.mesh(what, site), what), self._transform_to(frame))
+        return as_manifold(require_solid(self.mesh(what, site), what), self._transform_to(frame))
 
     def as_cadquery(self, what: str, site: int | None = None) -> Any:
         """A ``cadquery.Shape`` with the faces of the part's CAD file: the part, what is ``undamaged`` of it, or
@@ -343,23 +276,8 @@ class Result:
         return self.transform_to_scan if frame == "scan" else None
 
 
-def _choose_mesh(found: Mapping[str, Mesh | None], what: str, owner: str) -> Mesh:
-    if what not in found:
-        raise ValueError(f"{owner} has no '{what}'; there are: {', '.join(found)}")
-    mesh = found[what]
-    if mesh is None:
-        raise ValueError(f"{owner} has no {what}: nothing is {'left' if what == 'undamaged' else 'lost'}")
-    return mesh
-
-
 def _give_kept(file: Path, result: Result, what: str, site: int | None) -> Any:
     return json.loads(file.read_text(encoding="utf-8"))
-
-
-def _require_solid(mesh: Mesh, what: str) -> Solid:
-    if not isinstance(mesh, Solid):
-        raise ValueError(f"{what} is an open mesh, and manifold3d takes solids; take as_trimesh")
-    return mesh
 
 
 Conversion = Callable[[Result, str, int | None], Any]

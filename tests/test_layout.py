@@ -74,7 +74,8 @@ def test_a_room_is_seen_at_once() -> None:
 def test_few_modules_lie_at_the_top() -> None:
     top = {path.name for path in (ROOT / "damageest").glob("*.py")}
     assert top == {
-        "__init__.py", "__main__.py", "api.py", "error_codes.py", "errors.py", "findings.py", "options.py", "result.py",
+        "__init__.py", "__main__.py", "api.py", "error_codes.py", "errors.py", "findings.py", "intervals.py",
+        "options.py", "result.py", "site.py",
     }  # fmt: skip
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -16,14 +16,12 @@ from damageest.artefacts.poses import require_rigid
 
 @dataclass(frozen=True)
 class PriorUse(Checked):
-    """Prediction by other parts of the type. ``parts``: their number; ``misfit``: residual on seen skin, root mean
-    square along the normals; ``limit``: the misfit from which a part counts as another type; ``is_used``: whether the
-    part was predicted from them."""
+    """Prediction by other parts of the type; ``misfit`` is along the normals."""
 
     parts: int
-    misfit: float
-    limit: float
-    is_used: bool
+    misfit: Annotated[float, "root mean square residual of their forms on seen skin"]
+    limit: Annotated[float, "largest misfit of a part of the type"]
+    is_used: Annotated[bool, "whether they predicted lost skin; false: this part deforms in another way"]
     _ranges: ClassVar[dict[str, Range]] = {"parts": (1, MOST), "misfit": (0.0, MOST), "limit": (0.0, MOST)}
 
 
@@ -36,29 +34,25 @@ class AdaptedPart(Checked):
     ``modes`` (K,V,3): independent errors of the displacement where no intact skin shows it, each as one standard
     deviation; ``unfollowed``: the same beside intact skin, from the worst residuals of the field. ``lowered`` (V,):
     depth of the skin below that of a field that hardly strains the metal, where noted: form or wear. ``other`` (V,3):
-    change of the displacement that explains the scan as well; None where there is none. ``amount``, ``rms``: largest
-    and root of the mean square of the displacement over the seen skin. ``growth``: the uniform scale in it, less 1;
-    ``strain``: largest principal strain beyond that, without unit; ``lattice``: cells along the axes, (0, 0, 0) for a
-    polynomial; ``functions``: number of functions for each coordinate. ``gain``: relative gain on held-out patches of
-    the scan against a rigid part; ``held_out``: root mean square residuals of rigid part and field there, deviations
-    limited; ``patches``: their number. ``field``: the same displacement at any place, for CAD faces and for other parts
-    of the type; None where there is none. ``seen`` (S,3): places on the skin as designed where intact skin was scanned;
-    skin within ``reach`` of one was seen; ``left`` (S,): distance of the scan outside the adapted skin there, noise
-    averaged out. ``prior``: prediction by other parts of the type; None without any. ``designed``: hashes that name the
+    change of the displacement that explains the scan as well; None where there is none. ``held_out``: root mean square
+    residuals of rigid part and field in held-out patches, deviations limited; ``patches``: their number. ``field``: the
+    same displacement at any place, for CAD faces and for other parts of the type; None where there is none. ``seen``
+    (S,3): places on the skin as designed where intact skin was scanned; skin within ``reach`` of one was seen; ``left``
+    (S,): distance of the scan outside the adapted skin there, noise averaged out. ``designed``: hashes that name the
     part as designed, for jobs on other parts of its type. ``notes`` are warnings.
     """
 
     part: Part
     displacement: Floats
-    motion: Floats
+    motion: Annotated[Floats, "4x4, the rigid motion beside the deformation, contained in alignment.transform"]
     modes: Floats
-    amount: float
-    rms: float
-    growth: float = 0.0
-    strain: float = 0.0
-    lattice: tuple[int, int, int] = (0, 0, 0)
-    functions: int = 0
-    gain: float = 0.0
+    amount: Annotated[float, "largest displacement of the seen intact skin, without a rigid motion"]
+    rms: Annotated[float, "root mean square displacement of the same skin"]
+    growth: Annotated[float, "uniform scale of the displacement, less 1"] = 0.0
+    strain: Annotated[float, "largest strain of the metal beyond uniform scale, without unit"] = 0.0
+    lattice: Annotated[tuple[int, int, int], "cells along the axes; 0, 0, 0: a cubic polynomial"] = (0, 0, 0)
+    functions: Annotated[int, "number of smooth functions for each coordinate of the displacement"] = 0
+    gain: Annotated[float, "relative gain in the fit of held-out patches, against a rigid part"] = 0.0
     notes: tuple[str, ...] = ()
     other: Floats | None = None
     field: DisplacementField | None = None
@@ -68,7 +62,7 @@ class AdaptedPart(Checked):
     seen: Floats | None = None
     reach: float = 0.0
     left: Floats | None = None
-    prior: PriorUse | None = None
+    prior: Annotated[PriorUse | None, "null where no other parts of the type were given"] = None
     designed: tuple[str, ...] = ()
     unfollowed: float = 0.0
     lowered: Floats | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 
@@ -60,25 +60,16 @@ class Enclosures(Checked):
 
 @dataclass(frozen=True)
 class Evidence:
-    """The check of one damage volume (DV) against the scan.
+    """The check of one damage volume (DV) against the scan. ``intact_share``: where intact points lie as densely as
+    elsewhere; 0 where they are fewer than four. Unlike ``skin_contradicted``, it is measured on shallow and small sites
+    too."""
 
-    ``ids_residual``: 95th percentile of the distance from the site's IDS points to the DV's boundary.
-    ``intact_points_inside``: intact scan points on the skin that the DV removes.
-    ``skin_contradicted``: share of the part's skin that the DV removes which intact scan points lie on.
-    ``skin_unseen``: share of the part's skin beside the DV that has no scan point: no evidence either way.
-    ``ids_unseen``: share of its inner surface without scan points near: there it is interpolated. ``ids_gap``: area of
-    the largest connected piece of that.
-    ``intact_share``: share of the skin that the DV removes on which intact points lie as densely as elsewhere, also
-    near the rim; 0 where they are fewer than four. Unlike ``skin_contradicted``, it is measured on shallow and small
-    sites too. ``consistent``: whether the scan agrees with the DV. ``causes``: the checks that say it does not.
-    """
-
-    ids_residual: float = 0.0
-    intact_points_inside: int = 0
-    skin_contradicted: float = 0.0
-    skin_unseen: float = 0.0
-    ids_unseen: float = 0.0
-    ids_gap: float = 0.0
-    intact_share: float = 0.0
-    consistent: bool = True
-    causes: tuple[EvidenceCause, ...] = ()
+    ids_residual: Annotated[float, "95th percentile of the IDS points' distance to the damage volume"] = 0.0
+    intact_points_inside: Annotated[int, "intact scan points on the skin that it removes"] = 0
+    skin_contradicted: Annotated[float, "share of the removed skin that intact scan points lie on"] = 0.0
+    skin_unseen: Annotated[float, "share of the skin beside the damage that the scan does not show"] = 0.0
+    ids_unseen: Annotated[float, "share of its inner surface without scan points near, interpolated"] = 0.0
+    ids_gap: Annotated[float, "area of the largest connected piece of inner surface without scan points near"] = 0.0
+    intact_share: Annotated[float, "share of the removed skin, rim included, that intact points lie on"] = 0.0
+    consistent: Annotated[bool, "whether the scan agrees with the damage volume"] = True
+    causes: Annotated[tuple[EvidenceCause, ...], "the checks that say it does not"] = ()

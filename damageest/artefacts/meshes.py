@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -138,11 +138,10 @@ class Deposit(Solid):
     """The solid to deposit for one damage, including stock to be milled off.
 
     ``cavity`` is the damage volume (DV) enlarged by the cut-back into intact metal, None without a cut-back;
-    ``cut_back_volume`` the volume that this removes in addition. ``milled``: where the cavity was opened (`prepare`),
-    the intact metal to be milled off before deposition, cut-back included: the DV then stays as it is.
-    ``stock_volume``: volume above the nominal surface; ``thickness``: its least, mean and largest height over skin with
-    stock, None without stock; ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`,
-    empty where the part has none. ``heights``: wanted height of the stock by number of the damage's CAD faces, -1 where
+    ``milled``: where the cavity was opened (`prepare`), the intact metal to be milled off before deposition, cut-back
+    included: the DV then stays as it is. ``thickness``: its least, mean and largest height over skin with stock, None
+    without stock; ``touched``: the numbers of the CAD faces that stock stands on, as in `Part.faces_brep`, empty where
+    the part has none. ``heights``: wanted height of the stock by number of the damage's CAD faces, -1 where
     it varies on the face; ``overlap``: width of the intact skin under stock. ``notes`` are warnings. ``opening``: a
     solid that takes the cavity out of the part and stands out of it, None where the cavity is the damage volume or that
     is not known. Where the cavity was opened, no face of it lies on the skin, so that a difference leaves nothing over
@@ -150,9 +149,13 @@ class Deposit(Solid):
     """
 
     cavity: Solid | None = None
-    stock_volume: float = 0.0
-    cut_back_volume: float = 0.0
-    thickness: tuple[float, float, float] | None = None
+    stock_volume: Annotated[float, "volume of the deposit beyond the nominal surface, to be milled off"] = 0.0
+    cut_back_volume: Annotated[
+        float, "volume of intact metal to remove before, for a clean surface or an open cavity"
+    ] = 0.0
+    thickness: Annotated[
+        tuple[float, float, float] | None, "thickness of the stock; null: no stock, or not measured"
+    ] = None
     touched: tuple[int, ...] = ()
     heights: tuple[tuple[int, float], ...] = ()
     overlap: float = 0.0
@@ -180,9 +183,8 @@ class Part(Solid):
     """The part as designed.
 
     ``faces_brep`` (F,) gives the number of the CAD face that each triangle came from, ``face_names`` and ``face_kinds``
-    what the CAD calls them; None and empty where the file was a mesh. ``tessellation_error`` bounds the distance
-    between the CAD surface and the triangles. ``cad_scale``: one length of the CAD file, as its reader takes it, in
-    ``unit``; 0 where the file was a mesh. ``notes``: repairs and conversions.
+    what the CAD calls them; None and empty where the file was a mesh. ``cad_scale``: one length of the CAD file, as its
+    reader takes it, in ``unit``; 0 where the file was a mesh.
 
     Where an earlier scan stands in place of the design: ``unseen`` (F,) has the triangles that only close the surface,
     since that scan has no points there, ``scan_noise`` the standard deviation of its points, and ``scan_spacing`` their
@@ -195,8 +197,8 @@ class Part(Solid):
     faces_brep: Ints | None = None
     face_names: tuple[str, ...] = ()
     face_kinds: tuple[str, ...] = ()
-    tessellation_error: float = 0.0
-    notes: tuple[str, ...] = ()
+    tessellation_error: Annotated[float, "bound on the distance between CAD surface and triangles"] = 0.0
+    notes: Annotated[tuple[str, ...], "repairs and conversions at reading"] = ()
     cad_scale: float = 0.0
     unseen: Flags | None = None
     scan_noise: float = 0.0

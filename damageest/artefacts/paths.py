@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -24,27 +24,24 @@ class Unreached(Checked):
 
 @dataclass(frozen=True)
 class BeadFill(Checked):
-    """The union of a path's beads against the deposit, on voxels with the edge ``voxel``.
+    """The union of a path's beads against the deposit, on voxels. ``air`` and ``air_95``: 0 where no bead lies on
+    metal."""
 
-    ``filled``: share of the reachable deposit that is filled. ``gap``: volume of the reachable deposit that is not;
-    ``largest_gap``: that of its largest connected piece; ``void``: diameter of the largest ball in it. ``spill``:
-    volume of beads outside the deposit and the metal; ``spill_distance``: how far it reaches from the deposit.
-    ``sunk``: volume of beads where metal is already. ``of_deposit``: share of the whole deposit that is filled, what is
-    listed as unreached included. ``air`` and ``air_95``: height of the air between metal and the beads that lie on it,
-    in the median and in 95 % of their length; 0 where none lies on metal.
-    """
-
-    voxel: float
-    filled: float
-    gap: float
-    void: float
-    largest_gap: float
-    spill: float
-    spill_distance: float
-    sunk: float
-    of_deposit: float
-    air: float = 0.0
-    air_95: float = 0.0
+    voxel: Annotated[float, "edge of the voxels"]
+    filled: Annotated[float, "share of the reachable deposit that beads fill"]
+    gap: Annotated[float, "volume of the reachable deposit without beads"]
+    void: Annotated[float, "diameter of the largest ball in it"]
+    largest_gap: Annotated[float, "volume of its largest connected piece"]
+    spill: Annotated[float, "volume of beads outside the deposit and the metal"]
+    spill_distance: Annotated[float, "largest distance of beads from deposit and metal"]
+    sunk: Annotated[float, "volume of beads where metal is already"]
+    of_deposit: Annotated[
+        float,
+        "share of the whole deposit that beads fill: 1 without the shares of `unreachable_volume` and "
+        "`gap`, as far as the voxels resolve it",
+    ]
+    air: Annotated[float, "height of the air between metal and the beads that lie on it, median"] = 0.0
+    air_95: Annotated[float, "the height that 95 % of their length does not exceed"] = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,20 +53,16 @@ class DepositPath(Checked):
     ``feed`` (N,): speed of the move that ends there, in lengths a minute; ``on`` (N,): whether it deposits. ``layer``,
     ``number``, ``part`` (N,): of layer, pass and part of the deposit, from 1. ``directions`` (P,3): the build direction
     of each part; ``heights`` (P,): of its layers. ``width`` of a bead; ``section``: area of its section, that of what
-    it adds. ``nozzle``: its mesh, tip at 0, axis along z. ``clearance``: least distance of the nozzle from anything
-    while it deposits, ``travel_clearance`` while it travels; inf without obstacles. ``tightest`` (2,3): point and axis
-    where it is least. ``unreached``: what is not filled, by reason, and ``missing``: the same as a solid. ``fill``: the
-    simulated beads; None where they were not simulated. ``notes`` are warnings. ``kinds``: what each pass is, by its
-    number: row, ring, spiral, rim, or gap (between others); empty where not known. ``setup`` (4,4): takes a point
-    to the frame in which the part is set up, its z along the tool, for a path of three axes; None for other paths.
-    ``channels``: names of what the process is given besides the speed, as power or powder, and ``values`` (N,C): of
-    each on the move that ends there, in the unit that the job has; None without channels. ``layer_form``: planar, or
-    conformal where the layers follow the floor of the cavity; empty where not known. ``around`` (4,): centre and radius
-    of a ball that holds all that the tool must not touch; ``free_ends`` (K,): whether the tool can leave it straight
-    along its axis from the end of each pass. Both None where not known,
-    the second also where the tool axis is the same everywhere. ``dwell`` (N,): seconds that the tool stands at each
-    point, with the process off; None: nowhere. ``bead_sizes`` (N,2): width and height of the bead of the move that ends
-    there, as its settings make it; None: ``width`` and ``heights``, with which the path was planned.
+    it adds. ``nozzle``: its mesh, tip at 0, axis along z. ``clearance``, ``travel_clearance``: inf without obstacles.
+    ``tightest`` (2,3): point and axis where it is least. ``missing``: what is ``unreached``, as a solid. ``notes`` are
+    warnings. ``kinds``: what each pass is, by its number: row, ring, spiral, rim, or gap (between others); empty where
+    not known. ``setup`` (4,4). ``channels``: names of what the process is given besides the speed, as power or powder,
+    and ``values`` (N,C): of each on the move that ends there, in the unit that the job has; None without channels.
+    ``around`` (4,): centre and radius of a ball that holds all that the tool must not touch; ``free_ends`` (K,):
+    whether the tool can leave it straight along its axis from the end of each pass. Both None where not known, the
+    second also where the tool axis is the same everywhere. ``dwell`` (N,): seconds that the tool stands at each point,
+    with the process off; None: nowhere. ``bead_sizes`` (N,2): width and height of the bead of the move that ends there,
+    as its settings make it; None: ``width`` and ``heights``, with which the path was planned.
     """
 
     points: Floats
@@ -87,18 +80,30 @@ class DepositPath(Checked):
     standoff: float
     deposit_volume: float
     nozzle: Mesh
-    clearance: float
-    travel_clearance: float
+    clearance: Annotated[
+        float,
+        "least distance of the nozzle from metal, earlier deposits, fixture and layers below during "
+        "deposition; null: none is near",
+    ]
+    travel_clearance: Annotated[float, "the same least distance between passes"]
     tightest: Floats | None = None
-    unreached: tuple[Unreached, ...] = ()
+    unreached: Annotated[tuple[Unreached, ...], "that volume by reason"] = ()
     missing: Solid | None = None
-    fill: BeadFill | None = None
+    fill: Annotated[BeadFill | None, "null where it was not simulated"] = None
     notes: tuple[str, ...] = ()
     kinds: tuple[str, ...] = ()
-    setup: Floats | None = None
+    setup: Annotated[
+        Floats | None,
+        "with 3 axes: transform (4 rows) of a point of the part's frame to the frame in which the part is "
+        "set up, z along the tool; the path's files are in that frame. Null: they are in the part's frame",
+    ] = None
     channels: tuple[str, ...] = ()
     values: Floats | None = None
-    layer_form: str = ""
+    layer_form: Annotated[
+        str,
+        "planar: planes across the build direction; conformal: surfaces along the floor of the cavity; "
+        "empty: not known",
+    ] = ""
     around: Floats | None = None
     free_ends: Flags | None = None
     dwell: Floats | None = None
@@ -183,7 +188,7 @@ class DepositPath(Checked):
 
     @property
     def travel(self) -> float:
-        """Length of the moves between passes."""
+        """Length of the moves between them."""
         return float(self.moves[~self.on].sum())
 
     @property
@@ -193,7 +198,7 @@ class DepositPath(Checked):
 
     @property
     def wait_minutes(self) -> float:
-        """Time that the tool waits between beads."""
+        """Minutes of these in which the tool waits for neighbouring beads to cool down."""
         return float(self.waits.sum()) / 60
 
     @property
@@ -223,7 +228,7 @@ class DepositPath(Checked):
 
     @property
     def bead_volume(self) -> float:
-        """Volume that the passes add: length by section, larger or smaller as the beads are."""
+        """Volume that the passes add: length by section, that of the beads as laid."""
         if not len(self.points):
             return 0.0
         added = self.moves * self.section[self.part - 1]
@@ -233,9 +238,12 @@ class DepositPath(Checked):
 
     @property
     def surplus_volume(self) -> float:
-        """Volume that the passes add beyond the reached deposit; 0 where they add less."""
+        """Volume that the passes add beyond the reached deposit.
+
+        It is 0 where they add less."""
         return max(self.bead_volume - (self.deposit_volume - self.unreached_volume), 0.0)
 
     @property
     def unreached_volume(self) -> float:
+        """Volume of the deposit that no pass fills."""
         return sum(item.volume for item in self.unreached)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -31,18 +31,16 @@ def require_rigid(name: str, poses: Floats) -> None:
 
 @dataclass(frozen=True)
 class FreeMotion(Checked):
-    """A motion that unworn skin leaves free: after it the scan fits the part as well.
+    """A motion that unworn skin leaves free: after it the scan fits the part as well. ``low`` and ``high`` are measured
+    from the pose that was found."""
 
-    ``direction``: unit vector of a shift, or of the axis of a turn through ``point`` (None: a shift), in the part's
-    frame. ``low``, ``high``: ends of the motion, in the job's unit, 0 being the pose found; of a turn, the movement of
-    the skin that moves most. ``turn``: angle in radians for each unit of it, 0 for a shift. ``text``: the same as text.
-    """
-
-    direction: Vector
-    low: float
-    high: float
-    point: Vector | None = None
-    turn: float = 0.0
+    direction: Annotated[Vector, "direction of a shift, or of the axis of a turn; unit vector in the part's frame"]
+    low: Annotated[
+        float, "lower end of the motion, in the job's unit; of a turn: movement of the skin farthest from the axis"
+    ]
+    high: Annotated[float, "upper end of the motion, in the same"]
+    point: Annotated[Vector | None, "a point on the axis of a turn; null for a shift"] = None
+    turn: Annotated[float, "angle in radians for each unit of movement; 0 for a shift"] = 0.0
     text: str = ""
 
     def move(self, points: Floats) -> Floats:
@@ -56,25 +54,21 @@ class FreeMotion(Checked):
 class DatumFit(Checked):
     """How one datum of a datum system was fitted to the scan, in the order of precedence.
 
-    ``name``: its letter. ``kind``: its shape, for example "plane", or "3 cylinders" for a pattern. ``faces``: numbers
-    of its CAD faces, empty where the part is a mesh. ``takes``: the degrees of freedom that it fixes, as text in the
-    part's frame. ``points``: scan points on it; ``contact``: the share of them on the fitted shape, ``inside``: below
-    it, for example by wear. ``rms``: of the means of patches in contact, in the job's unit. ``nominal`` and
-    ``measured``: the radius of each cylinder and sphere, in the job's unit. ``shapes``: the kind of each of its shapes,
-    with ``places`` on it (a plane's middle, on the axis, the apex, the centre), ``axes`` (a plane's outward normal; 0
-    for a sphere), and whether it is a ``bores`` face, with the outside toward the axis.
+    ``shapes``: the kind of each of its shapes, with ``places`` on it (a plane's middle, on the axis, the apex, the
+    centre), ``axes`` (a plane's outward normal; 0 for a sphere), and whether it is a ``bores`` face, with the outside
+    toward the axis.
     """
 
-    name: str
-    kind: str
-    faces: tuple[int, ...] = ()
-    takes: tuple[str, ...] = ()
-    points: int = 0
-    contact: float = 1.0
-    inside: float = 0.0
-    rms: float = 0.0
-    nominal: tuple[float, ...] = ()
-    measured: tuple[float, ...] = ()
+    name: Annotated[str, "letter of the datum"]
+    kind: Annotated[str, "shape, for example `plane`, or `3 cylinders` for a pattern"]
+    faces: Annotated[tuple[int, ...], "numbers of its CAD faces; empty where the part is a mesh"] = ()
+    takes: Annotated[tuple[str, ...], "degrees of freedom that it fixes beyond earlier datums"] = ()
+    points: Annotated[int, "scan points on it"] = 0
+    contact: Annotated[float, "share of them on the fitted shape"] = 1.0
+    inside: Annotated[float, "share of them below the fitted shape, for example by wear"] = 0.0
+    rms: Annotated[float, "root mean square distance of patches in contact from the fitted shape"] = 0.0
+    nominal: Annotated[tuple[float, ...], "radius of each cylinder and sphere, as designed"] = ()
+    measured: Annotated[tuple[float, ...], "radius of each as fitted to the scan"] = ()
     shapes: tuple[str, ...] = ()
     places: tuple[Vector, ...] = ()
     axes: tuple[Vector, ...] = ()
@@ -86,29 +80,26 @@ class DatumFit(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Pose(Checked):
-    """``T_part_scan`` (4,4), rigid. ``rms`` of the inliers' distance to the part, ``inliers`` their share of the scan.
+    """``T_part_scan`` (4,4), rigid. ``alternatives`` (K,4,4): with them the pose is one of several right ones, and
+    ``notes`` say so.
 
-    ``alternatives`` (K,4,4) are other poses that fit the scan equally well, for example on a symmetric part: then the
-    pose is one of several right ones, and ``notes`` say so. ``doubts``: reasons against the pose, and so against every
-    site, for example a small share of the scan on the part. Of those with the code `other_poses`, that poses fit which
-    are no symmetries, only sites are concerned whose metal is another one in them. ``free``: motions that unworn skin
-    leaves free. ``is_held``: whether skin without wear holds the pose but for those; False where that was not tested.
-    ``datums``: how the datums of a datum system were fitted, and ``left``: motions that they leave free and that the
-    rest of the skin fixes, without a range. ``spread`` (6,K): the errors of a pose by datums, as columns of one
-    standard deviation each: rotation about the middle of the part's bounds, in radians, then shift, in the job's unit;
-    None where the pose was fitted to all of the skin.
+    Of ``doubts`` with the code `other_poses`, that poses fit which are no symmetries, only sites are concerned whose
+    metal is another one in them. ``is_held``: False where that was not tested. ``left``: motions without a range.
+    ``spread`` (6,K): the errors of a pose by datums, as columns of one standard deviation each: rotation about the
+    middle of the part's bounds, in radians, then shift, in the job's unit; None where the pose was fitted to all of the
+    skin.
     """
 
     T_part_scan: Floats
-    rms: float = 0.0
-    inliers: float = 1.0
-    alternatives: Floats | None = None
+    rms: Annotated[float, "root mean square distance of the inliers to the part"] = 0.0
+    inliers: Annotated[float, "share of the scan's points"] = 1.0
+    alternatives: Annotated[Floats | None, "other poses that fit as well, for example on a symmetric part"] = None
     notes: tuple[str, ...] = ()
-    doubts: tuple[Reason, ...] = ()
-    free: tuple[FreeMotion, ...] = ()
-    is_held: bool = False
-    datums: tuple[DatumFit, ...] = ()
-    left: tuple[FreeMotion, ...] = ()
+    doubts: Annotated[tuple[Reason, ...], "reasons against the pose, and so against every site"] = ()
+    free: Annotated[tuple[FreeMotion, ...], "motions that no unworn skin fixes"] = ()
+    is_held: Annotated[bool, "whether unworn skin fixes all other motions"] = False
+    datums: Annotated[tuple[DatumFit, ...], "datums of a datum system, in the order of precedence; else empty"] = ()
+    left: Annotated[tuple[FreeMotion, ...], "motions that the datum system leaves free, fixed by other skin"] = ()
     spread: Floats | None = None
     _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64, "spread": np.float64}
     _ranges: ClassVar[dict[str, Range]] = {"rms": (0.0, MOST), "inliers": (0.0, 1.0)}

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import Literal
+from typing import Annotated, Literal
 
 from damageest.artefacts.arrays import Vector
 from damageest.errors import clean_message
 
 Effect = Literal["contradicts", "open", "widens", "note"]
-"""What a reason does to a verdict. `contradicts`: the site is doubtful. `open`: something could not be seen; without an
-amount, the upper end of the interval is open. `widens`: it is a term of the interval. `note`: it changes no verdict."""
+"""What a reason does to a verdict, see `Reason`."""
 
 # A line of a job, and a command of a terminal: both are written as they are.
 _LITERAL = re.compile(r"\w+:|(pip|uv|damageest|python) ")
@@ -19,20 +18,19 @@ _LITERAL = re.compile(r"\w+:|(pip|uv|damageest|python) ")
 
 @dataclass(frozen=True)
 class Reason:
-    """One finding. No code reads ``text``: its wording may change at any time.
+    """One finding. No code reads ``text``."""
 
-    ``code``: a word that stays the same from version to version. ``amount``: its size in ``unit`` (for example "mm" or
-    "mm³"; "" for a share or a number), or None. ``place`` (3,): where, in the part's frame. ``remedy``: what to do;
-    empty where nothing helps.
-    """
-
-    code: str
-    text: str
-    effect: Effect = "note"
-    amount: float | None = None
-    unit: str = ""
-    place: Vector | None = None
-    remedy: str = ""
+    code: Annotated[str, "a word that stays the same from version to version; the documentation lists them"]
+    text: Annotated[str, "the finding in a sentence; the wording may change from version to version"]
+    effect: Annotated[
+        Effect,
+        "contradicts: the site is doubtful; open: something could not be seen, without an amount the upper "
+        "end of the interval is open; widens: a term of the interval; note: changes no verdict",
+    ] = "note"
+    amount: Annotated[float | None, "size of the finding; null: none"] = None
+    unit: Annotated[str, "unit of the amount; empty for a share or a number"] = ""
+    place: Annotated[Vector | None, "where, in the part's frame; null where it has no place"] = None
+    remedy: Annotated[str, "what to do; empty where nothing helps"] = ""
 
     def __post_init__(self) -> None:
         """Cuts and cleans the texts: those of plugins may be of any length, with any characters."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, TypeVar
+from typing import Annotated, Any, ClassVar, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -55,15 +55,14 @@ class Truth(Checked):
 class Scan(Checked):
     """Points (N,3) on the damaged part; ``normals`` (N,3) outward, or None.
 
-    ``noise`` is the measured standard deviation of the points off the local surface and ``spacing`` the median distance
-    to the nearest neighbours that a reconstructed surface has to bridge; both 0 until measured. ``viewpoints`` (V,3):
-    where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's view,
-    -1 where its scanner position is not known. Both None where no position is known. ``cloud`` (N,): the number of the
-    cloud of each point, for example of its file: the points of one cloud do not move against each other, whether its
-    scanner position is known or not; -1 where that is not known. None: a view is a cloud. ``total``: number of points
-    in the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence`` (N,) on
-    the scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with, the
-    points of a file without are grey, and their confidence is no number. ``warnings``: what the reader doubts.
+    ``noise``, and ``spacing``, a median of distances to the nearest neighbours, are 0 until measured. ``viewpoints``
+    (V,3): where the scanner stood for each view, in the frame of the points; ``view`` (N,): the number of each point's
+    view, -1 where its scanner position is not known. Both None where no position is known. ``cloud`` (N,): the number
+    of the cloud of each point, for example of its file: the points of one cloud do not move against each other, whether
+    its scanner position is known or not; -1 where that is not known. None: a view is a cloud. ``total``: number of
+    points in the files where only some of them are here, else 0. ``colours`` (N,3) from 0 to 255, and ``confidence``
+    (N,) on the scale of the files, as the scanner's program wrote them; None where no file has them. Beside files with,
+    the points of a file without are grey, and their confidence is no number. ``warnings``: what the reader doubts.
     ``columns``: which columns of text files are x, y and z, and why, where it is not plain.
     """
 
@@ -71,8 +70,8 @@ class Scan(Checked):
     normals: Floats | None = None
     unit: str = "mm"
     paths: tuple[str, ...] = ()
-    noise: float = 0.0
-    spacing: float = 0.0
+    noise: Annotated[float, "measured standard deviation of the points off the local surface"] = 0.0
+    spacing: Annotated[float, "measured distance that a reconstructed surface has to bridge"] = 0.0
     truth: Truth | None = None
     notes: tuple[str, ...] = ()
     viewpoints: Floats | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
@@ -16,21 +16,19 @@ SECTION_KINDS = ("blade", "round", "contour", "line", "none")
 
 @dataclass(frozen=True)
 class SectionValue(Checked):
-    """One measured quantity. ``nominal`` and ``measured``: as designed and as scanned; None where there is none.
-    ``error``: standard uncertainty of ``measured``. ``unit``: "length" or "degrees". ``note``: why it was not measured,
-    or what is to be known of it."""
+    """One quantity of a section."""
 
     name: str
-    nominal: float | None
-    measured: float | None
-    error: float = 0.0
-    unit: str = "length"
-    note: str = ""
+    nominal: Annotated[float | None, "value as designed"]
+    measured: Annotated[float | None, "value as scanned; null where the scan does not show it"]
+    error: Annotated[float, "standard uncertainty of `measured`"] = 0.0
+    unit: Annotated[str, "length: the job's unit"] = "length"
+    note: Annotated[str, "why there is no value, or its range of validity; else empty"] = ""
     _ranges: ClassVar[dict[str, Range]] = {"error": (0.0, MOST)}
 
     @property
     def difference(self) -> float | None:
-        """Measured less nominal; None where one of them is not known."""
+        """Measured less nominal."""
         return None if self.nominal is None or self.measured is None else self.measured - self.nominal
 
 
@@ -72,27 +70,21 @@ class SectionContour(Checked):
 
 @dataclass(frozen=True, eq=False)
 class Section(Checked):
-    """A section of part and scan.
-
-    ``origin`` (3,), in the part's frame, is the plane's zero; ``along``, ``out`` and ``across`` are unit vectors, the
-    first two its coordinates, the third its normal. ``kind``: one of `SECTION_KINDS`. ``group``: the number, from 1, of
-    the item of the job that asks for it. ``seen``: share of the outlines that the scan shows. ``slab``: scan points
-    within this distance of the plane were used, ``points`` of them. ``marks``: places in the plane to draw, by name.
-    ``notes``: what is to be known.
-    """
+    """A section of part and scan, in the part's frame. ``kind``: one of `SECTION_KINDS`. ``marks``: places in the plane
+    to draw, by name. ``points``: the scan points that were used."""
 
     number: int
     name: str
-    kind: str
-    origin: Vector
-    along: Vector
-    out: Vector
-    across: Vector
+    kind: Annotated[str, "none: nothing of the part is here"]
+    origin: Annotated[Vector, "zero of the plane's coordinates"]
+    along: Annotated[Vector, "first axis of the plane, unit vector; of a line its direction"]
+    out: Annotated[Vector, "second axis of the plane, unit vector"]
+    across: Annotated[Vector, "normal of the plane, unit vector"]
     contours: tuple[SectionContour, ...] = ()
     values: tuple[SectionValue, ...] = ()
-    group: int = 1
-    seen: float = 0.0
-    slab: float = 0.0
+    group: Annotated[int, "number, from 1, of the item of the job's `sections`"] = 1
+    seen: Annotated[float, "share of the outlines that the scan shows"] = 0.0
+    slab: Annotated[float, "scan points within this distance of the plane were used"] = 0.0
     points: int = 0
     marks: tuple[tuple[str, float, float], ...] = ()
     notes: tuple[str, ...] = ()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -18,14 +18,12 @@ MOST = 8
 
 class StiffMode(NamedTuple):
     """``kind``: scale, stretch, bend, twist or taper; ``axis``: along which the part is longer, about which it turns,
-    along which cross-sections grow, or that becomes an arc; empty for scale. ``toward``: to where the ends bend, else
-    empty. ``amount``: the largest displacement that it makes, beyond a rigid motion; negative: shorter, smaller, or to
-    the other side."""
+    along which cross-sections grow, or that becomes an arc."""
 
     kind: str
-    axis: str
-    toward: str
-    amount: float
+    axis: Annotated[str, "x, y or z of the part's frame: axis of a stretch, bend, twist or taper; empty for scale"]
+    toward: Annotated[str, "direction to which the ends of a bend go; else empty"]
+    amount: Annotated[float, "largest displacement by this mode beyond a rigid motion; negative: the other way"]
 
 
 def name_modes(places: Floats, displacement: Floats) -> tuple[list[StiffMode], float]:

@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from pydantic import Field
 
-from damageest.artefacts import AdaptedPart, Vector
+from damageest.artefacts import AdaptedPart, PriorUse, Vector
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.stiff_modes import StiffMode, name_modes
@@ -19,15 +19,8 @@ PLACES = 4000
 """Places on the skin by which the displacement is named."""
 
 
-class StiffModeReport(JsonModel):
+class StiffModeReport(JsonModel, of=StiffMode):
     kind: Literal["scale", "stretch", "bend", "twist", "taper"]
-    axis: str = Field(
-        description="x, y or z of the part's frame: axis of a stretch, bend, twist or taper; empty for scale"
-    )
-    toward: str = Field(description="direction to which the ends of a bend go; else empty")
-    amount: float = Field(
-        description="largest displacement by this mode beyond a rigid motion; negative: the other way"
-    )
 
 
 class HeldOutReport(JsonModel):
@@ -44,34 +37,26 @@ class ExtrapolationReport(JsonModel):
     deviation: float = Field(description="largest standard deviation of the adapted skin there, along its normal")
 
 
-class PriorReport(JsonModel):
+class PriorReport(JsonModel, of=PriorUse, fields="used parts misfit limit"):
     """Prediction by the job's other parts of the type."""
 
     used: bool = Field(description="whether they predicted lost skin; false: this part deforms in another way")
-    parts: int
-    misfit: float = Field(description="root mean square residual of their forms on seen skin")
-    limit: float = Field(description="largest misfit of a part of the type")
 
 
-class AdaptReport(JsonModel):
+class AdaptReport(
+    JsonModel,
+    of=AdaptedPart,
+    fields="amount where rms growth strain modes left lattice functions gain cross_validation extrapolation prior "
+    "motion",
+):
     """How the part as designed was deformed. Sites, damage and coordinates are those of the deformed part."""
 
-    amount: float = Field(description="largest displacement of the seen intact skin, without a rigid motion")
     where: Vector | None = Field(description="position of the largest displacement on the deformed part; null: unknown")
-    rms: float = Field(description="root mean square displacement of the same skin")
-    growth: float = Field(description="uniform scale of the displacement, less 1")
-    strain: float = Field(description="largest strain of the metal beyond uniform scale, without unit")
     modes: list[StiffModeReport] = Field(description="modes of the displacement, the largest first")
     left: float = Field(description="root mean square displacement outside these modes")
-    lattice: tuple[int, int, int] = Field(description="cells along the axes; 0, 0, 0: a cubic polynomial")
-    functions: int = Field(description="number of smooth functions for each coordinate of the displacement")
-    gain: float = Field(description="relative gain in the fit of held-out patches, against a rigid part")
     cross_validation: HeldOutReport
     extrapolation: list[ExtrapolationReport] = Field(description="extrapolation of the field into each site")
-    prior: PriorReport | None = Field(description="null where no other parts of the type were given")
-    motion: list[list[float]] = Field(
-        description="4x4, the rigid motion beside the deformation, contained in alignment.transform"
-    )
+    motion: list[list[float]]
 
 
 def report_adapt(adapted: AdaptedPart | None, sites: Sequence[Site]) -> AdaptReport | None:
@@ -84,7 +69,7 @@ def report_adapt(adapted: AdaptedPart | None, sites: Sequence[Site]) -> AdaptRep
     return AdaptReport.read(
         adapted,
         where=find_largest(adapted),
-        modes=[StiffModeReport(**mode._asdict()) for mode in modes],
+        modes=modes,
         left=left,
         cross_validation=HeldOutReport(patches=adapted.patches, rigid=before, adapted=after),
         extrapolation=[

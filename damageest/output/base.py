@@ -1,4 +1,4 @@
-"""The base of all models of result.json."""
+"""The base of all models of result.json, and the one that most of them share, of a reason."""
 
 from __future__ import annotations
 
@@ -14,24 +14,31 @@ from typing import Annotated, Any, Self
 import numpy as np
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, field_validator
 
+from damageest.artefacts import Reason
+
 
 class JsonModel(BaseModel):
     """A part of result.json, and of its schema. It is filled from the attributes of a value with the same names; an
     array becomes a list.
 
     ``class SomeReport(JsonModel, of=Some)`` has the fields of the dataclass ``Some``, but for those of ``without``: in
-    its order, with its types and the texts of its ``Annotated``, and without its defaults. An annotation in the class
-    itself replaces the type.
+    its order, with its types and the texts of its ``Annotated``, and without its defaults. ``fields``: names of those
+    that it has, and of properties of ``Some``, in the order of JSON. An annotation in the class itself replaces a
+    field's type or a property, or adds a field.
     """
 
     model_config = ConfigDict(extra="forbid", populate_by_name=True, defer_build=True, from_attributes=True)
 
-    def __init_subclass__(cls, of: type | None = None, without: Collection[str] = (), **more: Any) -> None:
+    def __init_subclass__(
+        cls, of: type | None = None, without: Collection[str] = (), fields: str = "", **more: Any
+    ) -> None:
         super().__init_subclass__(**more)
         if of is not None:
             own = inspect.get_annotations(cls)
-            cls.__annotations__ = _derive_fields(of, without, own) | own
-            _MODELS[of] = cls
+            hints = typing.get_type_hints(of, include_extras=True)
+            names = fields.split() or [name for name in hints if name not in without]
+            cls.__annotations__ = {name: _derive_field(of, name, hints, own.pop(name, None)) for name in names} | own
+            _MODELS.setdefault(of, cls)
 
     @field_validator("*", mode="before")
     @classmethod
@@ -48,15 +55,18 @@ _MODELS: dict[Any, type[JsonModel]] = {}
 """The model of each value that has one."""
 
 
-def _derive_fields(of: type, without: Collection[str], own: dict[str, Any]) -> dict[str, Any]:
-    """The types of the fields of a dataclass in JSON, with their texts."""
-    derived = {}
-    for name, hint in typing.get_type_hints(of, include_extras=True).items():
-        if name not in without:
-            kind, *texts = typing.get_args(hint) if typing.get_origin(hint) is Annotated else (hint,)
-            kind = own.pop(name) if name in own else _to_json(kind)
-            derived[name] = Annotated[kind, Field(description=texts[0])] if texts else kind
-    return derived
+def _derive_field(of: type, name: str, hints: dict[str, Any], own: Any) -> Any:
+    """The type in JSON of a field or property of a class, with its text: of a property the first paragraph of its
+    docstring. ``own``: the type that the model has."""
+    hint, text = hints.get(name), ""
+    if hint is None and own is None and (member := getattr(of, name, None)) is not None:
+        getter = member.fget if isinstance(member, property) else member.func
+        hint, words = typing.get_type_hints(getter)["return"], inspect.getdoc(getter) or ""
+        text = " ".join((words[:1].lower() + words[1:]).partition("\n\n")[0].removesuffix(".").split())
+    elif typing.get_origin(hint) is Annotated:
+        hint, text = typing.get_args(hint)
+    kind = own or _to_json(hint)
+    return Annotated[kind, Field(description=text)] if text else kind
 
 
 def _to_json(kind: Any) -> Any:
@@ -67,6 +77,9 @@ def _to_json(kind: Any) -> Any:
     if typing.get_origin(kind) is tuple and items[-1] is ...:
         return list[_to_json(items[0])]  # type: ignore[misc]
     return _MODELS.get(kind, kind)
+
+
+class ReasonReport(JsonModel, of=Reason, fields="code effect amount unit place text remedy"): ...
 
 
 Bound = Annotated[float | None, BeforeValidator(lambda value: value if math.isfinite(value) else None)]

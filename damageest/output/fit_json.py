@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 from pydantic import Field
 
 from damageest.artefacts import Vector
-from damageest.findings import ModelFit, PatchDeviation, ViewFit
+from damageest.findings import Deformed, ModelFit, PatchDeviation, ViewFit
 from damageest.output.base import JsonModel
 
 
@@ -24,7 +22,7 @@ class ScaleReport(JsonModel):
 
 
 class DeformationReport(JsonModel):
-    kind: Literal["bend", "twist", "shear", "stretch", "scale"]
+    kind: Deformed
     amount: float = Field(description="largest displacement of the seen skin by it beyond the nearest rigid motion")
 
 
@@ -32,25 +30,15 @@ class ViewReport(JsonModel, of=ViewFit, without=("is_elsewhere",)):
     shift: Vector
 
 
-class FitReport(JsonModel):
+class FitReport(
+    JsonModel,
+    of=ModelFit,
+    fields="model words deviations scale deformation amount amount_error views views_from views_hidden waviness",
+):
     """How well the part as designed, in one rigid pose, explains the intact skin."""
 
-    model: Literal["ok", "scaled", "deformed", "views disagree", "wavy", "open"]
-    words: str = Field(description="the model with its amounts")
-    deviations: list[PatchReport] = Field(description="at widths of 20, 50 and 100 tolerances, where the part has them")
     scale: ScaleReport
     deformation: list[DeformationReport] = Field(description="empty where the model is not deformed")
-    amount: float = Field(description="largest displacement of the seen skin by the model; 0 where it is ok")
-    amount_error: float = Field(description="standard error of the amount")
-    views: list[ViewReport] = Field(description="empty where the views agree or are not known")
-    views_from: Literal["given", "order", "sheets"] = Field(
-        description="source of the assignment of points to views: the scan, the order of the points, or two "
-        "surfaces over the same skin"
-    )
-    views_hidden: float = Field(
-        description="volume that may be worn off where only the part shows how corrected views were misplaced"
-    )
-    waviness: float = Field(description="standard deviation that no model explains, inside and outside alike")
 
 
 def report_fit(fit: ModelFit | None) -> FitReport | None:

@@ -6,19 +6,18 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from damageest.artefacts import Floats, Vector
+from damageest.artefacts import Part, Scan
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
 from damageest.output.deviation_json import DeviationReport, report_deviation
-from damageest.output.fit_json import FitReport, report_fit
-from damageest.output.free_json import DatumReport, FreeMotionReport, LeftMotionReport
+from damageest.output.fit_json import report_fit
+from damageest.output.pose_json import AlignmentReport, report_alignment
 from damageest.output.provenance import ProvenanceReport
-from damageest.output.reason_json import ReasonReport
-from damageest.output.section_json import SectionReport, report_section
-from damageest.output.site_json import MaterialReport, SiteReport, index_files, report_site, sum_material
-from damageest.output.skin_json import CoverageReport, SurplusReport, report_surplus
-from damageest.output.uncertainty_json import BudgetReport, ReportedInterval
+from damageest.output.section_json import report_section
+from damageest.output.site_json import MaterialReport, index_files, report_site, sum_material
+from damageest.output.skin_json import report_surplus
+from damageest.output.uncertainty_json import ReportedInterval
 from damageest.result import Result, StageRecord, StepRecord
 from damageest.stages.export import ExportedFiles
 
@@ -26,13 +25,10 @@ _NOTHING = ExportedFiles()
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-class PartReport(JsonModel):
+class PartReport(JsonModel, of=Part, fields="path sha256 volume watertight tessellation_error notes"):
     path: str = Field(description="relative to this file; empty for a part given as arrays")
-    sha256: str
     volume: float
     watertight: bool
-    tessellation_error: float = Field(description="bound on the distance between CAD surface and triangles")
-    notes: list[str] = Field(description="repairs and conversions at reading")
 
 
 class NoiseLevelReport(JsonModel, of=NoiseLevel): ...
@@ -45,50 +41,12 @@ class SensorReport(JsonModel, of=Sensor):
     """The errors of the sensor, measured on intact skin."""
 
 
-class ScanReport(JsonModel):
-    paths: list[str]
+class ScanReport(JsonModel, of=Scan, fields="paths points total noise spacing notes"):
     points: int
     total: int = Field(description="points in the files, of which `points` are used: all near damage, others evenly")
-    noise: float = Field(description="measured standard deviation of the points off the local surface")
-    spacing: float = Field(description="measured distance that a reconstructed surface has to bridge")
-    notes: list[str]
 
 
-class RescaledReport(JsonModel):
-    factor: float = Field(description="divisor of the scan's lengths, for temperature and scale")
-    centre: Vector = Field(description="the place in the scanner's frame about which they were, which stays")
-
-
-class AlignmentReport(JsonModel):
-    transform: list[list[float]] = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
-    quaternion: tuple[float, float, float, float] = Field(
-        description="rotation as a quaternion: w, x, y, z; w is not negative"
-    )
-    translation: Vector = Field(description="shift, after the rotation")
-    rms: float = Field(description="root mean square distance of the inliers to the part")
-    inliers: float = Field(description="share of the scan's points")
-    alternatives: list[list[list[float]]] = Field(
-        description="other poses that fit as well, for example on a symmetric part"
-    )
-    notes: list[str]
-    doubts: list[ReasonReport] = Field(description="reasons against the pose, and so against every site")
-    free: list[FreeMotionReport] = Field(description="motions that no unworn skin fixes")
-    datums: list[DatumReport] = Field(description="datums of a datum system, in the order of precedence; else empty")
-    left: list[LeftMotionReport] = Field(description="motions that the datum system leaves free, fixed by other skin")
-    held: bool = Field(description="whether unworn skin fixes all other motions")
-    rescaled: RescaledReport | None = Field(
-        None,
-        description="only where the lengths of the scan were corrected: a raw point x is at "
-        "transform (centre + (x - centre) / factor) in the part",
-    )
-
-
-class ExportReport(JsonModel):
-    files: list[str] = Field(
-        description="all that were written, in the part's frame, which is that of the adapted part where adapt is not "
-        "null; those below scan_frame/ are in the scan's frame, those below nominal_frame/ on the part as designed"
-    )
-    notes: list[str] = Field(description="differences from the job, with the reason")
+class ExportReport(JsonModel, of=ExportedFiles, fields="files notes"): ...
 
 
 class TruthReport(JsonModel):
@@ -105,42 +63,23 @@ class StageReport(JsonModel, of=StageRecord): ...
 class StepReport(JsonModel, of=StepRecord): ...
 
 
-class Report(JsonModel):
+class Report(
+    JsonModel,
+    of=Result,
+    fields="version status name units tolerance part scan sensor alignment deviation coverage adapt fit sites surplus "
+    "sections export damage_volume volume_95 budget not_in_budget certificate undamaged_volume material truth stages "
+    "steps failures warnings versions provenance",
+):
     """The content of result.json. Lengths, areas and volumes in ``units``; coordinates in the part's frame."""
 
     version: Literal[1] = Field(1, alias="schema", description="version of this format")
-    status: Literal["ok", "incomplete"] = Field(description="incomplete: some sites have no damage volume or deposit")
-    name: str
-    units: str
-    tolerance: float
-    part: PartReport
-    scan: ScanReport
-    sensor: SensorReport | None = Field(description="null where nothing was measured")
     alignment: AlignmentReport
     deviation: DeviationReport
-    coverage: CoverageReport | None
     adapt: AdaptReport | None = Field(description="null where the part is as designed")
-    fit: FitReport | None = Field(description="null where too few points lie near the skin")
-    sites: list[SiteReport]
-    surplus: list[SurplusReport] = Field(description="bodies outside the nominal surface, surroundings last")
-    sections: list[SectionReport] = Field(description="sections of the job")
     export: ExportReport
-    damage_volume: float
-    volume_95: ReportedInterval | None = Field(
-        description="95 % interval of `damage_volume`, its high end null where nothing limits it; null: there is none"
-    )
-    budget: BudgetReport | None = Field(
-        description="budget of uncertainty of `damage_volume` (JCGM 100); null where there is no interval or no site"
-    )
-    not_in_budget: list[str] = Field(description="sources that the job does not give: not included in any interval")
-    certificate: str = Field(description="scanner and standard of its certificate; empty where the job has none")
-    undamaged_volume: float
+    volume_95: ReportedInterval | None
     material: MaterialReport = Field(description="material of the whole repair")
     truth: TruthReport | None
-    stages: list[StageReport]
-    steps: list[StepReport] = Field(description="steps between the stages, up to the report")
-    failures: list[str] = Field(description="sites without a damage volume or a deposit, and why")
-    warnings: list[ReasonReport] = Field(description="notes on the whole run, most important first")
     versions: dict[str, str]
     provenance: ProvenanceReport | None = Field(None, description="null in a result that is not in files")
 
@@ -163,7 +102,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
     import platform
     from importlib.metadata import version
 
-    part, scan, pose = result.part, result.scan, result.pose
+    part, scan = result.part, result.scan
     files = index_files(written.files)
     sites = [report_site(site, written, files) for site in result.sites]
     filled = Report.read(
@@ -176,17 +115,7 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
             points=len(scan.points),
             total=scan.total or len(scan.points),
         ),
-        alignment=AlignmentReport.read(
-            pose,
-            transform=pose.T_part_scan,
-            quaternion=_to_quaternion(pose.T_part_scan),
-            translation=pose.T_part_scan[:3, 3],
-            alternatives=[] if pose.alternatives is None else pose.alternatives,
-            held=pose.is_held,
-            rescaled=None
-            if result.scan_factor == 1 or result.scan_centre is None
-            else RescaledReport(factor=result.scan_factor, centre=tuple(result.scan_centre.tolist())),
-        ),
+        alignment=report_alignment(result),
         deviation=report_deviation(result.deviation),
         adapt=report_adapt(result.adapted, result.sites),
         fit=report_fit(result.fit),
@@ -208,13 +137,6 @@ def build_report(result: Result, written: ExportedFiles = _NOTHING, relative: An
 def to_dict(result: Result, what: str, site: int | None) -> dict[str, Any]:
     """The content of result.json without files, as a conversion of a result."""
     return build_report(result)
-
-
-def _to_quaternion(T: Floats) -> tuple[float, float, float, float]:
-    from scipy.spatial.transform import Rotation
-
-    x, y, z, w = Rotation.from_matrix(T[:3, :3]).as_quat(canonical=True).tolist()
-    return w, x, y, z
 
 
 def _report_truth(result: Result) -> TruthReport | None:

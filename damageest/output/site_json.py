@@ -3,34 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Literal
 
 from pydantic import Field
 
-from damageest.artefacts import Deposit, Vector
+from damageest.artefacts import Deposit, Evidence, Vector
+from damageest.findings import Verdict
 from damageest.output.base import JsonModel, strip_frame
 from damageest.output.path_json import PathReport, report_path
-from damageest.output.reason_json import ReasonReport
-from damageest.output.uncertainty_json import ReportedInterval, UncertaintyReport
+from damageest.output.uncertainty_json import ReportedInterval
 from damageest.result import Site
 from damageest.stages.export import DepositForm, ExactForm, ExportedFiles, MilledForm, Spline
 
 
-class EvidenceReport(JsonModel):
-    ids_residual: float = Field(description="95th percentile of the IDS points' distance to the damage volume")
-    intact_points_inside: int = Field(description="intact scan points on the skin that it removes")
-    skin_contradicted: float = Field(description="share of the removed skin that intact scan points lie on")
-    skin_unseen: float = Field(description="share of the skin beside the damage that the scan does not show")
-    ids_unseen: float = Field(description="share of its inner surface without scan points near, interpolated")
-    ids_gap: float = Field(description="area of the largest connected piece of inner surface without scan points near")
-    intact_share: float = Field(description="share of the removed skin, rim included, that intact points lie on")
-    consistent: bool = Field(description="whether the scan agrees with the damage volume")
-    causes: list[str] = Field(description="the checks that say it does not")
+class EvidenceReport(JsonModel, of=Evidence):
+    causes: list[str]
 
 
-class VerdictReport(JsonModel):
-    level: Literal["proven", "likely", "doubtful"]
-    reasons: list[ReasonReport] = Field(description="why, those first that change the verdict most")
+class VerdictReport(JsonModel, of=Verdict): ...
 
 
 class FilesReport(JsonModel):
@@ -68,13 +57,11 @@ class ThicknessReport(JsonModel):
     max: float
 
 
-class DepositReport(JsonModel):
+class DepositReport(JsonModel, of=Deposit, fields="volume stock_volume cut_back_volume thickness faces"):
     volume: float = Field(description="volume to deposit")
-    stock_volume: float = Field(description="volume of the deposit beyond the nominal surface, to be milled off")
-    cut_back_volume: float = Field(
-        description="volume of intact metal to remove before, for a clean surface or an open cavity"
-    )
-    thickness: ThicknessReport | None = Field(description="thickness of the stock; null: no stock, or not measured")
+    stock_volume: float
+    cut_back_volume: float
+    thickness: ThicknessReport | None
     faces: list[int] = Field(description="numbers of the CAD faces that stock stands on; empty without B-rep")
 
 
@@ -86,35 +73,28 @@ class MaterialReport(JsonModel):
     cut_back_volume: float
 
 
-class SiteReport(JsonModel):
-    id: int
+class SiteReport(
+    JsonModel,
+    of=Site,
+    fields="id points volume volume_95 depth_95 uncertainty surface_area max_depth volume_rates centroid bounds method "
+    "evidence verdict accepted deposit path files spline exact warnings",
+):
     points: int
     volume: float = Field(description="damage volume, enlarged by the cut-back if there is one")
     volume_95: ReportedInterval | None = Field(
         description="95 % interval of `volume`, its high end null where nothing limits it; null where there is none"
     )
     depth_95: ReportedInterval | None = Field(description="95 % interval of the largest depth, before a cut-back")
-    uncertainty: UncertaintyReport | None
     surface_area: float = Field(description="area of the inner damage surface")
-    max_depth: float = Field(description="largest depth of the scan below the lost skin")
-    volume_rates: list[float] = Field(description="change of the volume for each unit of each motion of alignment.free")
     centroid: Vector
     bounds: tuple[Vector, Vector]
-    method: str = Field(
-        description="surface: site by site; rays: a whole body of the part; pore: a closed cavity inside the metal; "
-        "otherwise the implementation that took all sites at once"
-    )
-    evidence: EvidenceReport
-    verdict: VerdictReport
-    accepted: bool = Field(description="whether it is part of damage_volume; a doubtful site is where the job says so")
     deposit: DepositReport | None = Field(
         description="null where the stage allowance refused the site, or it is not accepted"
     )
-    path: PathReport | None = Field(description="null where the job asks for none, or none could be planned")
+    path: PathReport | None
     files: FilesReport
     spline: SplineReport | None = Field(description="null: no spline in the job")
     exact: ExactReport | None = Field(description="null: no STEP in the job, or no CAD faces")
-    warnings: list[ReasonReport] = Field(description="notes of stages on the site; they change no verdict")
 
 
 def index_files(files: Iterable[str]) -> dict[str, list[str]]:

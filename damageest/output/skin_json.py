@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Literal
-
 import numpy as np
 from pydantic import Field
 
@@ -22,25 +20,18 @@ class UnseenReport(JsonModel, of=UnseenRegion):
 class CoverageReport(JsonModel, of=Coverage, without=("skin", "is_seen", "distance", "is_lost", "region")): ...
 
 
-class SurplusReport(JsonModel):
+class SurplusReport(
+    JsonModel,
+    of=Surplus,
+    fields="id kind points share volume estimate height area centre bounds file beside notes",
+):
     """Matter outside the nominal surface."""
 
-    id: int
-    kind: Literal["surplus", "displaced piece", "surroundings"] = Field(
-        description="surplus: added metal or dirt; displaced piece: losses of like size are beside it; surroundings: a "
-        "fixture, a table or a second specimen"
-    )
     points: int
-    share: float = Field(description="share of the scan's points")
-    volume: float | None = Field(description="null where it does not close, and for surroundings")
-    estimate: float = Field(description="estimated volume: area times mean height; 0 for surroundings")
-    height: float = Field(description="largest distance of its points from the nominal surface")
-    area: float = Field(description="area of the skin that it covers")
     centre: Vector = Field(description="centre of the bounds")
     bounds: tuple[Vector, Vector] = Field(description="bounds of the volume, else of the points")
     file: str | None = Field(description="the first one of the volume; null where there is none")
     beside: list[int] = Field(description="numbers of the sites beside it")
-    notes: list[str]
 
 
 def report_surplus(item: Surplus, result: Result, written: ExportedFiles) -> SurplusReport:

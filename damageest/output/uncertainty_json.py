@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from damageest.findings import Budget, BudgetBound, BudgetRow, Fading, Uncertainty
+from damageest.intervals import Budget, BudgetBound, BudgetRow, Fading, Uncertainty
 from damageest.output.base import Bound, JsonModel
 
 ReportedInterval = tuple[float, Bound]

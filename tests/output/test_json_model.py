@@ -26,8 +26,19 @@ class Edge:
     next: Corner | None = None
     hidden: float = 0.0
 
+    @property
+    def length(self) -> float:
+        """Length of its curve.
+
+        0 for a point."""
+        return self.hidden
+
 
 class CornerReport(JsonModel, of=Corner): ...
+
+
+class ShortReport(JsonModel, of=Edge, fields="length number kind"):
+    number: int
 
 
 class EdgeReport(JsonModel, of=Edge, without=("hidden",)):
@@ -54,3 +65,11 @@ def test_it_is_filled_from_the_value() -> None:
     }  # fmt: skip
     with pytest.raises(ValidationError, match="number"):
         EdgeReport.read(edge, number="none")
+
+
+def test_fields_are_named_in_the_order_of_json() -> None:
+    schema = ShortReport.model_json_schema(mode="serialization")
+    assert list(schema["properties"]) == schema["required"] == ["length", "number", "kind"]
+    assert schema["properties"]["length"] == {"description": "length of its curve", "title": "Length", "type": "number"}
+    edge = Edge(np.zeros(3), hidden=2.0)
+    assert ShortReport.read(edge, number=1).model_dump() == {"length": 2.0, "number": 1, "kind": "convex"}

@@ -20,14 +20,18 @@ from damageest.stages import Stage, asked_by_name
 class ExportedFiles(Checked):
     """The files of an export.
 
-    ``files``: paths relative to the output folder. ``notes``: differences from the job. ``splines``: for each site, by
+    ``files``: paths relative to the output folder. ``splines``: for each site, by
     its number, the fit of a spline to its inner damage surface; empty without splines in the job. ``exact``: for each
     site, by its number, whether its solid has the CAD's own faces; empty without exact solids in the job. ``warnings``:
     the notes that the run prints at its end.
     """
 
-    files: tuple[str, ...] = ()
-    notes: tuple[str, ...] = ()
+    files: Annotated[
+        tuple[str, ...],
+        "all that were written, in the part's frame, which is that of the adapted part where adapt is not "
+        "null; those below scan_frame/ are in the scan's frame, those below nominal_frame/ on the part as designed",
+    ] = ()
+    notes: Annotated[tuple[str, ...], "differences from the job, with the reason"] = ()
     splines: Mapping[int, Spline] = field(default_factory=dict)
     exact: Mapping[int, ExactForm] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
