@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
 from statistics import median
+from zlib import crc32
 
 from damageest_evaluate.case import DamageCase
 from damageest_evaluate.damages import KINDS
@@ -56,15 +57,16 @@ class FileCase(DamageCase):
 
 
 def make_file_cases(folder: Path, seed: int, source: str) -> list[FileCase]:
-    """A case for each file of the folder, in order of names: kinds of damage in turn."""
+    """A case for each file of the folder, in order of names. Its damage follows from name and seed alone."""
     files = sorted(path for path in folder.iterdir() if path.suffix.lower() in SUFFIXES)
+    numbers = [crc32(path.name.encode()) % 1000 for path in files]
     scanner = {"points": POINTS, "noise": 0.0, "pose": "random"}
     return [
         FileCase(
             part=path.name, seed=1000 * seed + number, first=tuple(KINDS)[number % len(KINDS)], tolerance=0.0,
             scanner=scanner, source=source, file=str(path.resolve()),
         )
-        for number, path in enumerate(files)
+        for number, path in zip(numbers, files, strict=True)
     ]  # fmt: skip
 
 

@@ -251,7 +251,7 @@ class RandomDamage:
 
 
 def make_random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), count: int | None = None) -> RandomDamage:
-    """One to three damages on a part, each at least 0.008 of the diagonal deep, and together within ``SHARE``.
+    """One to three damages on a part, each as deep as `find_least_depth`, and together within ``SHARE``.
 
     ``kinds``: of the first damages; the others are random. ``count``: how many; None: random. If the part has no place
     for a kind, another kind replaces it. Raises LookupError if no damage fits.
@@ -277,6 +277,12 @@ def make_random_damage(part: Part, seed: int, kinds: tuple[str, ...] = (), count
     return RandomDamage(tuple(tools), tuple(names), damage)
 
 
+def find_least_depth(part: Part) -> float:
+    """The least depth of a damage: 0.008 of the diagonal; on a thin wall, most of what lies between its two sides."""
+    wall = 2 * part.volume / part.face_areas.sum()
+    return float(min(0.008 * part.diagonal, 0.9 * wall / 2))
+
+
 def _try_damage(picker: PlacePicker, name: str, before: list[Tool]) -> tuple[list[Tool], Solid] | None:
     """The tools with one more damage, and the volume of all; None if it is too small, too large or does not fit."""
     part = picker.part
@@ -285,7 +291,7 @@ def _try_damage(picker: PlacePicker, name: str, before: list[Tool]) -> tuple[lis
         alone = apply_tools(part, more)[1]
         if alone is None or not SHARE[0] * part.volume < alone.volume < SHARE[1] * part.volume:
             return None
-        if measure_depth(alone, part) < 0.008 * part.diagonal:
+        if measure_depth(alone, part) < find_least_depth(part):
             return None
         tools = [*before, *more]
         damage = apply_tools(part, tools)[1] if before else alone

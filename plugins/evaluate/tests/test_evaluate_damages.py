@@ -1,10 +1,12 @@
 from __future__ import annotations
 
 import pytest
+import trimesh
 from damageest_benchmarks.parts import PARTS
 from damageest_evaluate.damages import KINDS, SHARE, make_random_damage
 from damageest_evaluate.scores import iou, measure_depth
 
+from damageest.artefacts import Part
 from damageest.geometry.solids import to_manifold
 from damageest.stages.scan.simulate import Simulate
 
@@ -19,6 +21,15 @@ def test_each_kind_makes_a_loss_of_its_size(kind: str, name: str) -> None:
     assert SHARE[0] < made.damage.volume / part.volume < SHARE[1]
     assert measure_depth(made.damage, part) >= 0.008 * part.diagonal
     assert (to_manifold(made.damage) - to_manifold(part)).volume() < 1e-9 * part.volume
+
+
+def test_a_thin_wall_is_broken_through() -> None:
+    outer, inner = trimesh.creation.box((40, 30, 20)), trimesh.creation.box((39.2, 29.2, 30))
+    cup = trimesh.boolean.difference([outer, inner])
+    part = Part(cup.vertices, cup.faces, "mm")
+    made = make_random_damage(part, 0, ("end",), count=1)
+    assert made.kinds == ("end",)
+    assert 0.7 * 0.2 < measure_depth(made.damage, part) <= 0.2
 
 
 @pytest.mark.slow
