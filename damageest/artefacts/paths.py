@@ -54,7 +54,7 @@ class DepositPath(Checked):
     ``number``, ``part`` (N,): of layer, pass and part of the deposit, from 1. ``directions`` (P,3): the build direction
     of each part; ``heights`` (P,): of its layers. ``width`` of a bead; ``section``: area of its section, that of what
     it adds. ``nozzle``: its mesh, tip at 0, axis along z. ``clearance``, ``travel_clearance``: inf without obstacles.
-    ``tightest`` (2,3): point and axis where it is least. ``missing``: what is ``unreached``, as a solid. ``notes`` are
+    ``tightest`` (2,3): point and axis of the least. ``missing``: what is ``unreached``, as a solid. ``notes`` are
     warnings. ``kinds``: what each pass is, by its number: row, ring, spiral, rim, or gap (between others); empty where
     not known. ``setup`` (4,4). ``channels``: names of what the process is given besides the speed, as power or powder,
     and ``values`` (N,C): of each on the move that ends there, in the unit that the job has; None without channels.
@@ -82,10 +82,10 @@ class DepositPath(Checked):
     nozzle: Mesh
     clearance: Annotated[
         float,
-        "least distance of the nozzle from metal, earlier deposits, fixture and layers below during "
-        "deposition; null: none is near",
+        "distance that the nozzle keeps at least from metal, earlier deposits, fixture and layers below "
+        "during deposition; what is farther than the job asks for is not measured; null: none is near",
     ]
-    travel_clearance: Annotated[float, "the same least distance between passes"]
+    travel_clearance: Annotated[float, "the same between passes"]
     tightest: Floats | None = None
     unreached: Annotated[tuple[Unreached, ...], "that volume by reason"] = ()
     missing: Solid | None = None

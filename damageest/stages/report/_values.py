@@ -94,7 +94,7 @@ def list_path(site: Site, unit: str, words: Words) -> list[tuple[str, str]]:
         (tell("unreached volume"), tell("{volume}, {share} of the deposit", volume=missing, share=format_share(share))),
     ]
     if path.clearance < float("inf"):
-        rows.append((tell("least clearance of the nozzle"), f"{format_number(path.clearance, 2)} {unit}"))
+        rows.append((tell("the nozzle stays clear by at least"), f"{format_number(path.clearance, 2)} {unit}"))
     if path.fill is not None:
         rows.append((tell("filled share of the reached volume"), f"{path.fill.filled:.2%}"))
     return rows
