@@ -26,7 +26,9 @@ FROM build AS build-core
 RUN /opt/uv/bin/uv sync --no-dev --no-editable --extra report
 
 FROM build AS build-all
-RUN /opt/uv/bin/uv sync --no-dev --no-editable --all-packages --all-extras --no-install-package damageest-benchmarks
+# not the benchmarks, nor what only they need
+RUN /opt/uv/bin/uv sync --no-dev --no-editable --all-packages --all-extras --no-install-package damageest-benchmarks \
+      --no-install-package pycpd --no-install-package future
 
 # HOME is writable for every user, so that `--user` may name one that the image does not know.
 FROM base AS run

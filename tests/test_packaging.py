@@ -63,6 +63,14 @@ def test_installation_names_the_system_libraries_of_all_plugins(plugin: str) -> 
     assert not needed - set(line.split())
 
 
+def test_the_benchmarks_are_in_no_image_and_no_wheel() -> None:
+    benchmarks = tomllib.loads((ROOT / "benchmarks/pyproject.toml").read_text())["project"]
+    left_out = set(re.findall(r"--no-install-package (\S+)", read_dockerfile()["build-all"]))
+    alone = {re.split(r"\W*[>=]", name)[0] for name in benchmarks["optional-dependencies"]["drift"]}
+    assert {benchmarks["name"], *alone} <= left_out
+    assert not re.findall(r"uv build.*--all-packages", (ROOT / "docs/install.md").read_text())
+
+
 def test_the_context_of_the_image_is_what_a_build_needs() -> None:
     kept = {line[1:] for line in (ROOT / ".dockerignore").read_text().splitlines() if line.startswith("!")}
     needed = {"damageest", "plugins", "pyproject.toml", PROJECT["readme"], *PROJECT["license-files"]}

@@ -27,7 +27,7 @@ def fit_by_drift(part: Part, points: Floats) -> Part:
     try:
         from pycpd import DeformableRegistration
     except ImportError:
-        raise InputError("coherent point drift needs the library pycpd; install damageest-evaluate[drift]") from None
+        raise InputError("coherent point drift needs the library pycpd; pip install pycpd") from None
     rng = np.random.default_rng(0)
     mesh = cut_part(part, part.diagonal / FINE)
     source = sample_by_area(part, USED, rng)[0]
