@@ -157,6 +157,11 @@ class StageError(DamageestError):
         return f"{text}\n  try: {self.remedy}" if self.remedy else text
 
 
+def describe_error(error: BaseException, most: int | None = None) -> str:
+    """The message of an error in one line, cut to ``most`` characters; the name of its type where it has no message."""
+    return " ".join(str(error).split())[:most] or type(error).__name__
+
+
 def suggest(name: str, valid: Sequence[str]) -> str:
     """A clause that names the valid word nearest to a wrong one: `` (did you mean 'x'?)``; empty where none is near."""
     close = difflib.get_close_matches(name, valid, n=1, cutoff=0.6)
@@ -259,7 +264,7 @@ def describe_missing_library(error: BaseException) -> StageError | None:
         missing.extra = extra
         return missing
     if isinstance(error, ImportError):
-        text = " ".join(str(error).split())[:400]
+        text = describe_error(error, 400)
         if "failed to map segment" in text or "cannot allocate memory" in text.lower():
             return StageError(
                 f"ran out of memory, for {text.partition(':')[0]}", "more memory (--memory)", code="memory"

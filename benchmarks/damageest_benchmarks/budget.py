@@ -21,7 +21,7 @@ from damageest_evaluate.processes import Row
 from damageest_evaluate.tables import describe_measurement, format_markdown
 
 from damageest.artefacts import Floats, Part, Scan, Solid
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 from damageest.geometry.lost_depth import measure_lost_depth
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
 from damageest.io.digests import digest
@@ -147,7 +147,7 @@ class Scene:
         try:
             result = damageest.run(job, part=self.part, scan=Scan(self.draw(rng)), registry=registry)
         except DamageestError as error:
-            return {"error": " ".join(str(error).split())}
+            return {"error": describe_error(error)}
         return self.compare(result)
 
     def make_certificate(self) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from damageest_evaluate.processes import Row
 from damageest_evaluate.tables import describe_measurement, format_markdown
 
 from damageest.artefacts import Flags, Floats
-from damageest.errors import DamageestError, InputError, StageError
+from damageest.errors import DamageestError, InputError, StageError, describe_error
 from damageest.geometry.solids import to_arrays
 from damageest.geometry.vectors import cross_corners, normalise
 from damageest.io.digests import digest
@@ -158,10 +158,10 @@ class DifferenceCase:
             try:
                 result = damageest.run(job)
             except (StageError, InputError) as error:
-                text = " ".join(str(error).split()).replace(folder, "")
+                text = describe_error(error).replace(folder, "")
                 return row | {"outcome": "said", "why": text, "seconds": time.process_time() - start}
             except DamageestError as error:
-                return row | {"error": " ".join(str(error).split())}
+                return row | {"error": describe_error(error)}
         return row | self._compare(result, drawn.lost) | {"seconds": time.process_time() - start}
 
     def _compare(self, result: Result, lost: float) -> Row:

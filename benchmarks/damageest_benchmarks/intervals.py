@@ -15,7 +15,7 @@ from damageest_evaluate.processes import Row
 from damageest_evaluate.tables import describe_measurement, format_markdown
 
 from damageest.artefacts import Scan
-from damageest.errors import DamageestError, InputError, suggest
+from damageest.errors import DamageestError, InputError, describe_error, suggest
 from damageest.findings import Interval
 from damageest.geometry.lost_depth import measure_lost_depth
 from damageest.io.digests import digest
@@ -86,7 +86,7 @@ def run_interval_case(case: IntervalCase) -> Row:
     try:
         scan, kinds = simulate_scan(case, part)
     except (LookupError, DamageestError) as error:
-        return row | {"error": " ".join(str(error).split()), "skipped": True}
+        return row | {"error": describe_error(error), "skipped": True}
     truth = scan.truth.damage if scan.truth else None
     assert truth is not None
     row |= {"kinds": list(kinds), "true_volume": truth.volume, "true_depth": measure_lost_depth(truth, part)}
@@ -96,7 +96,7 @@ def run_interval_case(case: IntervalCase) -> Row:
         blind = Scan(scan.points, unit=scan.unit)  # without the truth
         result = damageest.run(job, part=part, scan=blind, settings=list(case.settings))
     except DamageestError as error:
-        return row | {"error": " ".join(str(error).split()), "seconds": time.perf_counter() - start}
+        return row | {"error": describe_error(error), "seconds": time.perf_counter() - start}
     return row | {
         "seconds": time.perf_counter() - start,
         "volume": result.damage_volume,

@@ -14,7 +14,7 @@ from damageest_evaluate.processes import Row
 from damageest_evaluate.scores import iou
 
 from damageest.artefacts import Part, Scan, Solid, Truth
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 from damageest.isolation import cpu_seconds
 from damageest.stages.scan.simulate import Simulate
 from damageest_benchmarks.parts import PARTS
@@ -92,7 +92,7 @@ def _run_cell(job: Mapping[str, Any], part: Part, scan: Scan, truth: Solid, cach
             dict(job), part=part, scan=scan, settings=["report=none", "accept=all"], cache=cache, output=False
         )
     except DamageestError as error:
-        return {"iou": 0.0, "volume": 0.0, "refused": " ".join(str(error).split()), "seconds": cpu_seconds() - start}
+        return {"iou": 0.0, "volume": 0.0, "refused": describe_error(error), "seconds": cpu_seconds() - start}
     found = [site.damage for site in result.sites]
     return {
         "iou": iou(found, [truth]), "volume": sum(one.volume for one in found) / truth.volume,

@@ -14,7 +14,7 @@ from damageest_evaluate.damages import KINDS
 from damageest_evaluate.processes import Row
 
 from damageest.artefacts import Part
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 
 POINTS = 120_000
 NOISE, TOLERANCE = 0.0004, 0.0015
@@ -48,7 +48,7 @@ class FileCase(DamageCase):
         try:
             part = self.load_part()
         except DamageestError as error:
-            return self.make_blank_row() | {"error": " ".join(str(error).split()), "skipped": True, "missed": 0}
+            return self.make_blank_row() | {"error": describe_error(error), "skipped": True, "missed": 0}
         scanner = {**self.scanner, "noise": NOISE * part.diagonal}
         tolerance = float(f"{TOLERANCE * part.diagonal:.4g}")
         settings = (*self.settings, f"tolerance={tolerance}")

@@ -15,7 +15,7 @@ from typing import Any
 from damageest.batches.jobs import MATRIX
 from damageest.batches.page import keep_picture
 from damageest.batches.rows import describe_result
-from damageest.errors import DamageestError, StageError, clean_message
+from damageest.errors import DamageestError, StageError, clean_message, describe_error
 from damageest.isolation import Limits, ProcessError, Usage, call_isolated, end_workers, find_place
 from damageest.job import Job, load
 from damageest.pipeline.cache import digest
@@ -78,7 +78,7 @@ def run_job(task: dict[str, Any]) -> dict[str, Any]:
     except DamageestError as error:
         outcome = "failed" if isinstance(error, StageError) else "refused"
         outcome = _OUTCOMES.get(getattr(error, "why", ""), outcome) if outcome == "failed" else outcome
-        done = {"outcome": outcome, "error": " ".join(str(error).split())}
+        done = {"outcome": outcome, "error": describe_error(error)}
     return done | {"key": key}
 
 

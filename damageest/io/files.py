@@ -11,7 +11,15 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from damageest.errors import DamageestError, Fault, InputError, JobError, describe_missing_library, is_interrupt
+from damageest.errors import (
+    DamageestError,
+    Fault,
+    InputError,
+    JobError,
+    describe_error,
+    describe_missing_library,
+    is_interrupt,
+)
 
 WITHOUT_HOLES = 64 * 2**20
 """Size in bytes from which on it is checked that a file was written completely."""
@@ -72,7 +80,7 @@ def embed_png(data: bytes) -> str:
 
 def shorten_error(error: BaseException) -> str:
     """The message of a library's error in one line of at most 160 characters."""
-    text = " ".join(str(error).split()) or type(error).__name__
+    text = describe_error(error)
     return text if len(text) <= 160 else text[:157] + "..."
 
 

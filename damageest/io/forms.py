@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import ArtefactError, DisplacementField, Floats, Part, Scan, fit_scattered
-from damageest.errors import InputError
+from damageest.errors import InputError, describe_error
 from damageest.geometry.families import Family, build_family
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.transforms import find_nearest_motion, move_points
@@ -131,7 +131,7 @@ def read_form(path: Path) -> MeasuredForm:
         )  # fmt: skip
     except (OSError, EOFError, ValueError, LookupError, TypeError, ArtefactError, zipfile.BadZipFile, zlib.error,
             NotImplementedError, MemoryError, SyntaxError, TokenError) as error:  # fmt: skip
-        why = " ".join(str(error).split())[:120] or type(error).__name__
+        why = describe_error(error, 120)
         raise InputError(f"{path}: is no form of a measured part, or damaged ({why}); {AGAIN}") from None
 
 

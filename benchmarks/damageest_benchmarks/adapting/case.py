@@ -14,7 +14,7 @@ from damageest_evaluate.scores import iou
 from damageest_evaluate.sized import make_sized_damage
 
 from damageest.artefacts import Part, Scan, Solid
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 from damageest.geometry.transforms import move_points
 from damageest.isolation import cpu_seconds
 from damageest.result import Result
@@ -110,7 +110,7 @@ def measure(case: DeformedCase) -> dict[str, Any]:
         before = cpu_seconds()
         result = run_job(case, part, scan)
     except (DamageestError, LookupError) as error:
-        return row | {"error": " ".join(str(error).split())[:200]}
+        return row | {"error": describe_error(error, 200)}
     row["seconds"] = cpu_seconds() - before
     assert scan.truth is not None
     lost = scan.truth.deformed or scan.truth.damage

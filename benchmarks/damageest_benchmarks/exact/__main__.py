@@ -1,4 +1,4 @@
-"""``python -m damageest_cadquery.evaluate``: random damages on many parts, and what their exact forms are worth."""
+"""``python -m damageest_benchmarks.exact``: random damages on many parts, and what their exact forms are worth."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from typing import Any
 
 import numpy as np
 
+from damageest.errors import describe_error
+
 POINTS = 40_000
 NOISE, TOLERANCE = 0.00075, 0.003
 """Of the scan and of the job, in diagonals of the part."""
@@ -26,7 +28,7 @@ FINE = 1 / 48
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(prog="python -m damageest_cadquery.evaluate", description=__doc__)
+    parser = argparse.ArgumentParser(prog="python -m damageest_benchmarks.exact", description=__doc__)
     parser.add_argument("--output", type=Path, help="file of rows, one JSON object a line; grows")
     parser.add_argument("--cases", type=int, default=65, help="random damages, spread over the parts")
     parser.add_argument("--first", type=int, default=0, help="number of the first case")
@@ -107,7 +109,7 @@ def run_case(path: Path, seed: int, output: Path) -> list[dict[str, Any]]:
         }  # fmt: skip
         result = damageest.run(job, output=output, cache=False)
     except (LookupError, DamageestError) as error:
-        return [base | {"error": " ".join(str(error).split())[:300]}]
+        return [base | {"error": describe_error(error, 300)}]
     said = json.loads((output / "result.json").read_text())
     rows = []
     truth = result.scan.truth.damage if result.scan.truth else None

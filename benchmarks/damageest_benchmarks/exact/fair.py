@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Mesh, Part, Solid
+from damageest.errors import describe_error
 
 FINE = 1 / 128
 """Chord of the triangles that stand for CAD faces, in tolerances."""
@@ -101,4 +102,4 @@ def measure_fairly(
         if "deposit" in site:
             site["deposit"]["on_own_skin"] = cad.build_deposit(exact, height)
     except Exception as error:  # OpenCASCADE's exceptions share no base of their own
-        site["unfair"] = " ".join(str(error).split())[:200] or type(error).__name__
+        site["unfair"] = describe_error(error, 200)

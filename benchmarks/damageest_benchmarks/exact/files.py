@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from damageest.errors import describe_error
 from damageest.geometry.vectors import cross_corners
 from damageest_benchmarks.exact.files_rows import read_rows
 
@@ -80,7 +81,11 @@ def _measure(path: Path, first: int, seconds: float, prepare: bool) -> dict[str,
                 )  # fmt: skip
                 break
             except StageError as error:
-                row = {"file": path.name, "error": f"{find_place(error)}: {shorten(error)}", "kind": "ended"}
+                row = {
+                    "file": path.name,
+                    "error": f"{find_place(error)}: {describe_error(error, 300)}",
+                    "kind": "ended",
+                }
                 if time.perf_counter() - start > 0.9 * seconds:
                     break
         for site in row.get("sites", []):
@@ -94,12 +99,8 @@ def _measure(path: Path, first: int, seconds: float, prepare: bool) -> dict[str,
                         limits=read_limits, show=False,
                     )  # fmt: skip
                 except Exception as error:  # OpenCASCADE's exceptions share no base of their own
-                    site[what]["fault"] = f"cannot be read back: {shorten(error)}"
+                    site[what]["fault"] = f"cannot be read back: {describe_error(error, 300)}"
     return row
-
-
-def shorten(error: BaseException) -> str:
-    return " ".join(str(error).split())[:300] or type(error).__name__
 
 
 def measure_file(path: Path, first: int, place: Path, prepare: bool = False) -> dict[str, Any]:
@@ -116,16 +117,16 @@ def measure_file(path: Path, first: int, place: Path, prepare: bool = False) -> 
         tolerance = TOLERANCE * diagonal
         rough = Brep(path=path, chord=tolerance / 4).run(unit="mm", tolerance=None)
     except DamageestError as error:
-        return row | {"error": shorten(error), "kind": "refused"}
+        return row | {"error": describe_error(error, 300), "kind": "refused"}
     row |= {"diagonal": diagonal, "stock": STOCK * tolerance}
     try:
         kinds, tools = _draw_damage(rough, row["seed"])
     except LookupError as error:
-        return row | {"error": shorten(error), "kind": "no damage"}
+        return row | {"error": describe_error(error, 300), "kind": "no damage"}
     try:
         return row | {"kinds": kinds} | _measure_run(path, place, tolerance, row["seed"], tools, prepare)
     except DamageestError as error:
-        return row | {"kinds": kinds, "error": shorten(error), "kind": "failed"}
+        return row | {"kinds": kinds, "error": describe_error(error, 300), "kind": "failed"}
 
 
 def _measure_diagonal(path: Path) -> float:
@@ -139,7 +140,7 @@ def _measure_diagonal(path: Path) -> float:
     except InputError:
         raise
     except Exception as error:
-        raise InputError(f"cannot be read: {shorten(error)}") from error
+        raise InputError(f"cannot be read: {describe_error(error, 300)}") from error
     if not np.isfinite(diagonal) or diagonal <= 0:
         raise InputError("has no size")
     return diagonal  # OpenCASCADE's lengths are millimetres, but for BREP, which has no unit
@@ -154,7 +155,7 @@ def _draw_damage(part: Any, seed: int) -> tuple[list[str], list[dict[str, Any]]]
     try:
         drawn = make_random_damage(part, seed, (list(KINDS)[seed % len(KINDS)],), count=1)
     except (StageError, ValueError) as error:
-        raise LookupError(f"no damage fits the part: {shorten(error)}") from error
+        raise LookupError(f"no damage fits the part: {describe_error(error, 300)}") from error
     return list(drawn.kinds), [tool.model_dump(mode="json") for tool in drawn.tools]
 
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from damageest_evaluate.processes import Row
 
-from damageest.errors import InputError, StageError
+from damageest.errors import InputError, StageError, describe_error
 from damageest.result import Result
 from damageest_benchmarks.families.datums import draw_datums
 from damageest_benchmarks.families.hands import draw_hand
@@ -70,7 +70,7 @@ def run_case(case: FamilyCase) -> Row:
     try:
         result = damageest.run(job, part=draw.part, scan=draw.scan, settings=draw.settings)
     except (StageError, InputError) as error:
-        message = " ".join(str(error).split())
+        message = describe_error(error)
         row["seconds"] = time.perf_counter() - start
         judged = describe_judgement(judge_error(message))
         return row | {name: judged[name] for name in ("outcome", "reason", "refused")} | {"error": message[:300]}

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from damageest_evaluate.processes import Row
 
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 from damageest_benchmarks.real.reference import measure_range, sample
 
 
@@ -91,7 +91,7 @@ def run_real(case: RealCase) -> Row:
         job = {"version": 1, "units": case.part.unit}
         result = damageest.run(job, part=meshes[0], scan=given, settings=settings)
     except DamageestError as error:
-        return row | {"error": " ".join(str(error).split())[:300], "seconds": time.perf_counter() - start}
+        return row | {"error": describe_error(error, 300), "seconds": time.perf_counter() - start}
     row |= {"seconds": time.perf_counter() - start, "sites": len(result.sites)}
     row["notes"] = len(cap_notes(list_notes(result)))
     if not result.sites:

@@ -14,7 +14,7 @@ import numpy as np
 from damageest_evaluate.processes import Row
 
 from damageest.artefacts import Floats, Part, Scan
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 from damageest.geometry.solids import to_manifold, to_solid
 from damageest_benchmarks.real.reference import sample
 
@@ -179,7 +179,7 @@ def run_worn(case: WornCase) -> Row:
         job = {"version": 1, "units": "mm", "tolerance": TOLERANCE, "allowance": "none"}
         result = damageest.run(job, part=worn.part, scan=worn.scan)
     except DamageestError as error:
-        return row | {"error": " ".join(str(error).split())[:300], "seconds": time.perf_counter() - start}
+        return row | {"error": describe_error(error, 300), "seconds": time.perf_counter() - start}
     row["seconds"] = time.perf_counter() - start
     tree = cKDTree(worn.places)
     for site in sorted(result.sites, key=lambda one: one.damage.volume):

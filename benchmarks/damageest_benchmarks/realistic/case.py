@@ -19,7 +19,7 @@ from damageest_evaluate.scores import measure_depth
 from damageest_evaluate.sized import SIZED
 
 from damageest.artefacts import Floats, Mesh, Part, Scan, Solid
-from damageest.errors import DamageestError, InputError, StageError
+from damageest.errors import DamageestError, InputError, StageError, describe_error
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.vectors import normalise
@@ -161,7 +161,7 @@ def run_case(case: RealisticCase) -> dict[str, Any]:
         tools = make_loss(case, part, scanners) if case.damaged else ()
         scan = make_scanner(case, tools, scanners).run(part.unit, part)
     except (LookupError, StageError) as error:
-        return row | {"skipped": True, "error": _join_lines(error)}
+        return row | {"skipped": True, "error": describe_error(error)}
     clean_options = {"damage": tools, "points": case.points, "noise": CLEAN_NOISE * part.diagonal, "pose": "random"}
     clean = Simulate.model_validate({**clean_options, "seed": case.number}).run(part.unit, part)
     measure_start_seconds()
@@ -191,7 +191,7 @@ def _measure_run(part: Part, scan: Scan, sensor: Sensor) -> dict[str, Any]:
     try:
         result = run_job(part, scan)
     except (StageError, InputError) as error:
-        message = _join_lines(error)
+        message = describe_error(error)
         row |= describe_judgement(judge_error(message)) | {"iou": None, "error": message}
         return row | {"seconds": time.perf_counter() - start, "cpu_seconds": cpu_seconds() - before}
     except DamageestError as error:  # the job of the evaluation itself is at fault
@@ -210,7 +210,3 @@ def _measure_run(part: Part, scan: Scan, sensor: Sensor) -> dict[str, Any]:
         "notes": list_notes(result),
     }
     return row | describe_judgement(judge(result, TrueState(part, damage, pose, TOLERANCE * sensor.resolution)))
-
-
-def _join_lines(error: Exception) -> str:
-    return " ".join(str(error).split())

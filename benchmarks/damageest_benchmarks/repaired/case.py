@@ -15,7 +15,7 @@ import numpy as np
 from damageest_evaluate.processes import Row
 
 from damageest.artefacts import Floats, Part, Scan
-from damageest.errors import DamageestError
+from damageest.errors import DamageestError, describe_error
 from damageest.geometry.solids import to_solid
 from damageest_benchmarks.repaired.scenes import KINDS, TOLERANCE, Draw, Repaired, make_workpiece, scan
 
@@ -65,7 +65,7 @@ def run_repaired(case: RepairedCase) -> Row:
             damageest.run(job, part=Part(solid.vertices, solid.faces, unit="mm"), scan=before, output=folder / "out")
             aim = read_aim(folder / "out", "milled")
         except DamageestError as error:
-            return row | {"error": " ".join(str(error).split())[:300], "seconds": time.perf_counter() - start}
+            return row | {"error": describe_error(error, 300), "seconds": time.perf_counter() - start}
         middles = {number: body.bounds.mean(axis=0) for number, body in aim.deposits.items()}
         near = {n: int(np.linalg.norm(work.places - at, axis=1).argmin()) for n, at in middles.items()}
         for kind in case.kinds:
@@ -83,7 +83,7 @@ def _inspect(kind: str, repaired: Repaired, aim: Any, near: Mapping[int, int], f
     try:
         found = inspect_step(aim, folder / "after.npy", Question())
     except DamageestError as error:
-        return told | {"error": " ".join(str(error).split())[:300]}
+        return told | {"error": describe_error(error, 300)}
     sites = [[near[one.site], one.outcome, one.why, one.seen, one.shows] for one in found.verdicts]
     bad = {*repaired.wrong, *repaired.blind}
     wrongly = any(outcome == "met" and site in bad for site, outcome, *_ in sites)

@@ -14,7 +14,7 @@ import numpy as np
 
 from damageest import hookimpl
 from damageest.artefacts import Floats, Pose, Scan
-from damageest.errors import DamageestError, InputError, StageError
+from damageest.errors import DamageestError, InputError, StageError, describe_error
 from damageest.geometry.transforms import invert_pose
 from damageest.isolation import cpu_seconds
 from damageest.registry import Registry
@@ -122,7 +122,7 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     try:
         scene = make_scene(case)
     except (LookupError, StageError) as error:
-        return row | {"skipped": True, "error": " ".join(str(error).split())}
+        return row | {"skipped": True, "error": describe_error(error)}
     scan, pose = make_scan(case, scene)
     row["true_volume"] = scene.damage.volume if scene.damage else 0.0
     row["seen"] = scene.seen
@@ -136,7 +136,7 @@ def run_case(case: TroubleCase) -> dict[str, Any]:
     try:
         result = damageest.run({"version": 1}, part=scene.part, scan=scan, settings=settings, registry=registry)
     except (StageError, InputError) as error:
-        message = " ".join(str(error).split())
+        message = describe_error(error)
         row["seconds"] = time.perf_counter() - start
         return row | describe_judgement(judge_error(message)) | {"iou": None, "error": message}
     except DamageestError as error:  # the job of the evaluation itself is at fault

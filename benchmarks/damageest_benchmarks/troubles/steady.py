@@ -11,7 +11,7 @@ import numpy as np
 from damageest_evaluate.processes import Row
 
 from damageest.artefacts import Floats, Scan, Solid
-from damageest.errors import DamageestError, StageError
+from damageest.errors import DamageestError, StageError, describe_error
 from damageest.geometry.solids import to_manifold
 from damageest.geometry.transforms import move_mesh
 from damageest.result import Result, Site
@@ -87,7 +87,7 @@ def run_steady(case: SteadyCase) -> Row:
     try:
         scene = make_scene(replace(case, points=2 * case.points))
     except (LookupError, StageError) as error:
-        return row | {"error": " ".join(str(error).split())}
+        return row | {"error": describe_error(error)}
     scan, _ = make_scan(case, scene)
     settings = [*(["align=none"] if case.pose == "known" else []), *scene.settings]
     tolerance = Scanning(case.part, case.seed, amount=case.amount).tolerance
@@ -107,7 +107,7 @@ def run_steady(case: SteadyCase) -> Row:
                 continue
             row["sites"] += compare_sites(name, base, run(draw)[0])
     except DamageestError as error:
-        row["error"] = " ".join(str(error).split())
+        row["error"] = describe_error(error)
     return row | {"seconds": time.perf_counter() - start}
 
 

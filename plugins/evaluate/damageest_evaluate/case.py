@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Part, Scan, Solid
-from damageest.errors import DamageestError, StageError
+from damageest.errors import DamageestError, StageError, describe_error
 from damageest.isolation import cpu_seconds
 from damageest.registry import Registry
 from damageest.result import Result
@@ -126,7 +126,7 @@ def _run_measured(case: DamageCase, meter: Meter, start_seconds: float) -> dict[
     try:
         scan, kinds = simulate_scan(case, part)
     except (LookupError, DamageestError) as error:
-        return row | {"error": _join_lines(error), "skipped": True, "missed": 0}
+        return row | {"error": describe_error(error), "skipped": True, "missed": 0}
     truth = scan.truth
     assert truth is not None
     damage = truth.damage
@@ -142,7 +142,7 @@ def _run_measured(case: DamageCase, meter: Meter, start_seconds: float) -> dict[
         result = damageest.run(case.job or {"version": 1}, part=part, scan=blind, settings=settings, registry=registry)
     except DamageestError as error:
         # a refusal by a stage counts as flagged; an invalid job or input would be an error of the evaluation itself
-        row |= {"error": _join_lines(error), "flagged": isinstance(error, StageError)}
+        row |= {"error": describe_error(error), "flagged": isinstance(error, StageError)}
     row |= {"seconds": time.perf_counter() - start, "cpu_seconds": cpu_seconds() - cpu_start}
     row["start_seconds"] = start_seconds
     # read before scoring, which needs memory of its own
@@ -171,7 +171,3 @@ def _score_result(result: Result, part: Part, scan: Scan) -> dict[str, Any]:
         "reasons": [reason.code for site in result.sites for reason in site.verdict.reasons],
         "stage_seconds": stages,
     }
-
-
-def _join_lines(error: Exception) -> str:
-    return " ".join(str(error).split())
