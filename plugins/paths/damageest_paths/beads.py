@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import BeadFill, Flags, Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
-from damageest.geometry.rays import RayCaster
+from damageest.geometry.rays import prepare_rays
 from damageest.geometry.voxels import measure_bounds
 from damageest_paths.process.frames import Frame
 
@@ -97,16 +97,14 @@ def _measure_air(
     i, j, k = np.clip(np.floor((below - low) / edge).astype(np.int64), 0, np.array(done.shape) - 1).T
     some = np.flatnonzero(~done[i, j, k])
     some = some[:: max(1, len(some) // MOST_RAYS)]
-    depth = RayCaster(metal).find_first(middle[some], -beads.normal[some])[0]
+    depth = prepare_rays(metal).find_first(middle[some], -beads.normal[some])[0]
     air = np.maximum(depth - beads.height[some], 0.0)
     on_metal = air < OVERHANGS * beads.height[some]  # what is farther from it hangs over beside the floor
     air, length = air[on_metal], length[some][on_metal]
-    if not len(air):
+    if not length.sum() > 0:
         return 0.0, 0.0
-    order = np.argsort(air, kind="stable")
-    total = np.cumsum(length[order])
-    half, most = air[order][np.searchsorted(total, [0.5 * total[-1], 0.95 * total[-1]])]
-    return float(half), float(most)
+    half, most = np.quantile(air, (0.5, 0.95), weights=length, method="inverted_cdf").tolist()
+    return half, most
 
 
 def _measure_depth(gaps: Flags, boxes: Sequence[tuple[slice, ...]]) -> float:

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.spatial import KDTree
 
 from damageest.artefacts import DepositPath, Floats, Ints, Mesh, Solid
-from damageest.geometry.rays import RayCaster
+from damageest.geometry.rays import prepare_rays
 from damageest.geometry.vectors import normalise
 from damageest_paths.process.places import cut_moves, find_middles
 
@@ -45,7 +45,7 @@ def _find_metal_below(path: DepositPath, places: Floats, normals: Floats, own: I
     """The median distance (K,) down to metal from places across each bead."""
     along = normalise(path.points[own] - path.points[own - 1], 1e-12)
     side = np.cross(normals, along)
-    caster = RayCaster(left)
+    caster = prepare_rays(left)
     depths = [caster.find_first(places + share * path.width * side, -normals)[0] for share in ACROSS]
     return np.asarray(np.median(np.array(depths), axis=0))
 

@@ -103,7 +103,8 @@ def check_pieces(form: str, pieces: Sequence[Piece], cut_off: float, bodies: int
     weights, areas = weights / weights.sum(), areas / areas.sum()
     quarter = tolerance / 4
     beyond = max(float(weights[there > quarter].sum()), float(areas[back > quarter].sum()))
-    distance = max(_find_quantile(there, weights), _find_quantile(back, areas))
+    pairs = ((there, weights), (back, areas))
+    distance = max(float(np.quantile(one, 0.95, weights=own, method="inverted_cdf")) for one, own in pairs)
     farthest = max(float(there.max()), float(back.max()))
     near, cad = ON_CAD * part.diagonal + target.off_faces, target.cad_faces
     off = max((_measure_off(face, cad[number], near) for face, (number, _) in faces if number >= 0), default=0.0)
@@ -140,12 +141,6 @@ def _is_nearer(points: Floats, inner: Mesh, surface: Surface, quarter: float) ->
     if apart.sum() < 10:
         return True
     return bool(np.sqrt(np.mean(exact[apart] ** 2)) <= 1.1 * np.sqrt(np.mean(meshed[apart] ** 2)))
-
-
-def _find_quantile(values: Floats, weights: Floats, share: float = 0.95) -> float:
-    order = np.argsort(values)
-    at = int(np.searchsorted(np.cumsum(weights[order]), share))
-    return float(values[order[min(at, len(order) - 1)]])
 
 
 def mesh_faces(faces: Sequence[Any]) -> Mesh:

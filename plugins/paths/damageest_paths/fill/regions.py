@@ -5,12 +5,12 @@ A region is typed Any. Lengths are in the job's unit.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats
+from damageest.artefacts import Flags, Floats, Ints
 
 ROUND = 24
 """Corners of a full circle where a bead's end is drawn as a polygon."""
@@ -83,22 +83,27 @@ def cover(lines: Sequence[Floats], width: float) -> Any:
 
 
 def thin_line(line: Floats, off: float) -> Floats:
-    """A polyline (K,2) without corners that lie ``off`` beside it at most (Douglas and Peucker 1973)."""
-    kept = np.zeros(len(line), bool)
-    kept[[0, -1]] = True
-    todo = [(0, len(line) - 1)]
-    while todo:
-        low, high = todo.pop()
-        if high - low < 2:
-            continue
+    """A polyline (K,2) without corners that lie ``off`` beside it at most."""
+
+    def measure_off(low: int, high: int) -> Floats:
         way, away = line[high] - line[low], line[low + 1 : high] - line[low]
         share = np.clip(away @ way / max(float(way @ way), 1e-300), 0, 1)
-        far = np.linalg.norm(away - share[:, None] * way, axis=1)
-        if far.max() > off:
-            middle = low + 1 + int(far.argmax())
-            kept[middle] = True
+        return np.asarray(np.linalg.norm(away - share[:, None] * way, axis=1))
+
+    return line[find_corners(len(line), measure_off, off)]
+
+
+def find_corners(count: int, measure_off: Callable[[int, int], Floats], most: float) -> Ints:
+    """The numbers of the points of a polyline that are kept so that none between is off by more than ``most`` (Douglas
+    and Peucker 1973). ``measure_off``: of two numbers, how far each point between is off the line between them."""
+    kept, todo = {0, count - 1}, [(0, count - 1)]
+    while todo:
+        low, high = todo.pop()
+        if high - low > 1 and (off := measure_off(low, high)).max() > most:
+            middle = low + 1 + int(off.argmax())
+            kept.add(middle)
             todo += [(low, middle), (middle, high)]
-    return line[kept]
+    return np.array(sorted(kept))
 
 
 def _outline(line: Floats, radius: float) -> list[Floats]:

@@ -10,6 +10,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.clearance.gauges import Gauge, LeastGauge
+from damageest_paths.fill.regions import find_corners
 from damageest_paths.holding.reach import keep_reached
 from damageest_paths.holding.steady import steady_axes
 from damageest_paths.holding.sweeps import Sweeps
@@ -234,18 +235,11 @@ def make_pass(points: Floats, normals: Floats, run: Run, layer: int, process: Pr
 
 def _thin(values: Floats, line: Floats) -> Ints:
     """The numbers of the points that are kept so that ``values`` (N,K) between them differ by 1 at most from those
-    that change evenly along the line (N,3); by the method of Douglas and Peucker (1973)."""
+    that change evenly along the line (N,3)."""
     far = measure_along(line)
-    kept = {0, len(line) - 1}
-    todo = [(0, len(line) - 1)]
-    while todo:
-        low, high = todo.pop()
-        if high - low < 2:
-            continue
+
+    def measure_off(low: int, high: int) -> Floats:
         share = ((far[low + 1 : high] - far[low]) / max(far[high] - far[low], 1e-300))[:, None]
-        off = np.abs(values[low + 1 : high] - (1 - share) * values[low] - share * values[high]).max(axis=1)
-        if off.max() > 1:
-            middle = low + 1 + int(np.argmax(off))
-            kept.add(middle)
-            todo += [(low, middle), (middle, high)]
-    return np.array(sorted(kept))
+        return np.asarray(np.abs(values[low + 1 : high] - (1 - share) * values[low] - share * values[high]).max(axis=1))
+
+    return find_corners(len(line), measure_off, 1.0)
