@@ -92,7 +92,7 @@ def _inspect(folder: Path, scan: Path, step: str, asked: dict[str, Any], fixture
     from damageest.errors import Fault, InputError, JobError
     from damageest.inspection.aim import read_aim
     from damageest.inspection.compare import ask, inspect_step
-    from damageest.inspection.findings import name_places
+    from damageest.inspection.discrepancies import name_places
     from damageest.inspection.page import write_page
     from damageest.inspection.record import NAME, PAGE, append_inspection, read_record
     from damageest.io.files import check_output_file

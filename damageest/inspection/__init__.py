@@ -3,7 +3,7 @@
 # The modules:
 # aim.py: target of a step
 # compare.py: a scan against it
-# findings.py: missing and excess metal, with its place
+# discrepancies.py: missing and excess metal, with its place
 # places.py: the finished skin of a site, cut into places
 # joined.py: bodies that touch a site
 # verdicts.py: verdicts on sites and part

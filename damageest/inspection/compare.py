@@ -17,7 +17,7 @@ from damageest.api import run
 from damageest.artefacts import Flags
 from damageest.errors import InputError
 from damageest.inspection.aim import Aim
-from damageest.inspection.findings import Finding, list_findings
+from damageest.inspection.discrepancies import Finding, list_findings
 from damageest.inspection.joined import find_bodies, keep_joined, list_joined
 from damageest.inspection.places import cut_places, land_points
 from damageest.inspection.verdicts import Verdict, WholeVerdict, judge_site, judge_whole

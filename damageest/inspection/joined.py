@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import Flags, Ints
-from damageest.inspection.findings import Finding, to_vector
+from damageest.inspection.discrepancies import Finding, to_vector
 from damageest.inspection.places import Landed, Places
 from damageest.result import Result
 

@@ -7,7 +7,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from damageest.inspection.findings import name_places
+from damageest.inspection.discrepancies import name_places
 
 STYLE = """body{font:15px/1.45 system-ui,sans-serif;max-width:60rem;margin:0 auto;padding:1rem;color:#1c2329}
 h1{font-size:1.5rem}h2{font-size:1.15rem;border-top:1px solid #d8dde1;padding-top:.8rem}

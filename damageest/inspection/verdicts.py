@@ -10,7 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
-from damageest.inspection.findings import ELSEWHERE, Finding
+from damageest.inspection.discrepancies import ELSEWHERE, Finding
 from damageest.inspection.places import Landed, Places
 
 SHOWN = 0.98

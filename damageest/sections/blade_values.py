@@ -14,9 +14,9 @@ import numpy as np
 from damageest.artefacts import Flags, Floats
 from damageest.artefacts.sections import SectionContour, SectionValue
 from damageest.sections.blade import ALIKE, BladeShape, measure_blade
-from damageest.sections.contour import compare, measure_offsets
 from damageest.sections.cut import Cut, sum_errors
 from damageest.sections.fit import PlaneMotion, fit_motion
+from damageest.sections.outlines import compare, measure_offsets
 
 CLOSED = 2.5
 """Distance between two places on metal of the scan, in spacings, up to which no edge can be between them."""

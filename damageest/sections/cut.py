@@ -8,7 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest.artefacts.sections import SectionContour
-from damageest.sections.contour import WINDOW, FlatScan, Loop
+from damageest.sections.outlines import WINDOW, FlatScan, Loop
 from damageest.sections.planes import Place
 from damageest.trust.interval.pose_error import PoseError
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.sections.contour import FlatScan, Loop, measure_offsets
+from damageest.sections.outlines import FlatScan, Loop, measure_offsets
 
 ROUNDS = 25
 """Rounds of the robust fit."""

@@ -13,7 +13,9 @@ from damageest.job.sections import SectionChoice
 from damageest.sections.blade import is_blade, measure_blade
 from damageest.sections.blade_values import measure_as_blade
 from damageest.sections.circle import find_round
-from damageest.sections.contour import (
+from damageest.sections.cut import Cut, sum_errors
+from damageest.sections.line import measure_line
+from damageest.sections.outlines import (
     STEP,
     WINDOW,
     Loop,
@@ -22,8 +24,6 @@ from damageest.sections.contour import (
     flatten_scan,
     make_loop,
 )
-from damageest.sections.cut import Cut, sum_errors
-from damageest.sections.line import measure_line
 from damageest.sections.planes import Place, list_places
 from damageest.sections.round_values import measure_as_round
 from damageest.trust.interval.pose_error import PoseError

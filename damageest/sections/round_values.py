@@ -6,8 +6,8 @@ import numpy as np
 
 from damageest.artefacts.sections import SectionContour, SectionValue
 from damageest.sections.circle import Circle, find_round, fit_circle
-from damageest.sections.contour import Loop, fit_stations
 from damageest.sections.cut import FORM_WAVE, Cut, sum_errors
+from damageest.sections.outlines import Loop, fit_stations
 
 GROOVE = 6.0
 """Distance from the circle, in robust standard deviations of the stations, from which a part of the outline is a groove

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from damageest.geometry.nozzle import place_tool
 from damageest.geometry.solids import to_manifold
-from damageest.geometry.tools import place_tool
 from damageest.geometry.vectors import normalise
 from tests.path_shapes import dent, plan
 

@@ -9,7 +9,7 @@ from manifold3d import Manifold
 from damageest.artefacts import Floats, Mesh, Solid
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.solids import to_arrays
-from damageest.inspection.findings import Finding
+from damageest.inspection.discrepancies import Finding
 from damageest.inspection.places import Places, cut_places, land_points
 from damageest.inspection.verdicts import Verdict, judge_site, judge_whole
 

@@ -54,7 +54,7 @@ def test_yaml_1_2_numbers_and_words(job_file: JobFile, registry: Registry) -> No
 
 
 def test_options_without_a_name_are_the_routes_own(job_file: JobFile, registry: Registry) -> None:
-    assert EncloseAll in load(job_file("enclose: {screening: 2}\n"), registry).stages
+    assert EncloseAll in load(job_file("enclose: {point_weight: 2}\n"), registry).stages
     surface = load(job_file("method: surface\nenclose: {overhang: 2}\n"), registry)
     assert surface.stages[Enclose].use == "divide"
     assert load(job_file("boundary: all_loops\nenclose: {overhang: 2}\n"), registry).method == "surface"

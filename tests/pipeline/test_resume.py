@@ -94,7 +94,7 @@ def test_another_format_runs_the_export_alone(small_done: Path, registry: Regist
 
 
 def test_only_what_depends_on_a_change_runs_again(small_done: Path, registry: Registry) -> None:
-    result = damageest.run(small_done, output=True, settings=["enclose.screening=2"], registry=registry)
+    result = damageest.run(small_done, output=True, settings=["enclose.point_weight=2"], registry=registry)
     assert not {r.stage for r in result.stages if not r.cached} & {"part", "scan", "align", "segment", "cluster"}
 
 

@@ -130,11 +130,11 @@ def complete_sites(engine: Engine, state: JobState) -> tuple[tuple[FoundSite, ..
     """Adds the sites that no enclosure gives: bodies of the part that are gone altogether, and pores."""
     found = add_lost_bodies(state.part, state.skin, state.found)
     found, failures = add_pores(engine, state, found) if state.failures else (found, state.failures)
-    kept, told = _set_specks_aside(failures, state.sites, state.field, state.unit)
+    kept, told = _dismiss_specks(failures, state.sites, state.field, state.unit)
     return found, kept, told
 
 
-def _set_specks_aside(failures: Failures, sites: Sites, field: ScanField, unit: str) -> tuple[Failures, Reasons]:
+def _dismiss_specks(failures: Failures, sites: Sites, field: ScanField, unit: str) -> tuple[Failures, Reasons]:
     """Turns failures on clusters that are too small to be enclosed into warnings: stray points form such clusters."""
     kept, warnings = [], []
     for error in failures:

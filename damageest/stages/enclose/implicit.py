@@ -24,7 +24,7 @@ class Implicit(EncloseAll):
     For damage of any shape: several losses, worn-through walls, broken-off ends. It needs no rims and no background.
     """
 
-    renamed: ClassVar[Mapping[str, str]] = {"band": "rim_width", "push": "offset"}
+    renamed: ClassVar[Mapping[str, str]] = {"band": "rim_width", "push": "offset", "screening": "point_weight"}
     use: Literal["implicit"] = "implicit"
     cell: float = Field(1.0, gt=0.1, le=4, description="edge of a grid cell, in tolerances")
     rim_width: float = Field(
@@ -37,7 +37,7 @@ class Implicit(EncloseAll):
     margin: float = Field(
         8.0, ge=4, le=60, description="margin around a loss in which the surface is solved, in tolerances"
     )
-    screening: float = Field(
+    point_weight: float = Field(
         1.0, gt=0, le=100, description="weight of the points against the smoothness of the surface"
     )
     detail: float = Field(
@@ -74,7 +74,7 @@ class Implicit(EncloseAll):
                     "enclose.most_cells for smaller ones",
                 )
             points, normals, areas = select_in_grid(gathered, grid)
-            field = solve_coarse_to_fine(grid, points, normals, areas, self.screening)
+            field = solve_coarse_to_fine(grid, points, normals, areas, self.point_weight)
             field = cut_beyond_reach(grid, field, gathered, number, 4 * tolerance)
             region = extract_region(grid, field)
             if region is not None:

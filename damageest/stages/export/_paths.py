@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from damageest.artefacts import DepositPath, Floats, Mesh
+from damageest.geometry.nozzle import place_tool
 from damageest.geometry.solids import concatenate_meshes
-from damageest.geometry.tools import place_tool
 from damageest.geometry.transforms import move_mesh, move_points
 from damageest.io.meshes import write_ply
 from damageest.result import Result

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 from pydantic import Field
@@ -32,6 +33,7 @@ class PartFromScan(ReadPart):
     Only for parts without a CAD model: the surface has the noise of the scan, and sharp edges are rounded.
     """
 
+    renamed: ClassVar[Mapping[str, str]] = {"screening": "point_weight"}
     use: Literal["reconstruct"] = "reconstruct"
     path: JobPath | tuple[JobPath, ...] = Field(
         description="the specimen's scan, a file or a list of files in one frame, relative to the job's folder"
@@ -42,7 +44,7 @@ class PartFromScan(ReadPart):
     cell: float | None = Field(
         None, gt=0, description="resolution, in the job's unit; default: from the spacing and noise of the scan"
     )
-    screening: float = Field(4.0, gt=0, le=100, description="weight of the points against smoothness of the surface")
+    point_weight: float = Field(4.0, gt=0, le=100, description="weight of the points against smoothness of the surface")
     most_cells: int = Field(
         16_000_000,
         ge=100_000,
@@ -97,7 +99,7 @@ class PartFromScan(ReadPart):
         normals = _turn_outward(cloud, normals, 1.25 * max(cell, spacing))
         grid = make_grid(points.min(axis=0) - 8 * cell, points.max(axis=0) + 8 * cell, cell)
         # The level is positive inside, hence normals inward.
-        field = solve_coarse_to_fine(grid, cloud, -normals, measure_local_areas(cloud), self.screening)
+        field = solve_coarse_to_fine(grid, cloud, -normals, measure_local_areas(cloud), self.point_weight)
         region = extract_region(grid, field)
         if region is None:
             raise InputError("no closed surface could be reconstructed; scan the specimen from all sides")

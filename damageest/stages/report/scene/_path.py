@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest.geometry.tools import place_tool
+from damageest.geometry.nozzle import place_tool
 from damageest.io import colours
 from damageest.result import Site
 from damageest.stages.report import _style as style
