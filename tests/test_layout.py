@@ -59,7 +59,6 @@ ONE_EACH = {"damageest/cli", "damageest/trust/doubts"}
 CROWDED = {
     "damageest/geometry": 68,
     "damageest/io": 20,
-    "plugins/app/damageest_app": 21,
 }
 """Rooms with more, and how many: public names of others, or what nobody has divided yet. None may come to be here."""
 

@@ -169,7 +169,7 @@ def test_the_recording_shows_the_volume_of_the_readme_and_loads_nothing() -> Non
 def test_lost_metal_cut_back_and_stock_stand_wherever_a_result_is_shown(small_done: Path) -> None:
     """In the terminal, the report, the PDF, the notebook and the app: the same three numbers."""
     pdf = import_or_skip("pypdfium2")
-    app_results = import_or_skip("damageest_app.results")
+    app_results = import_or_skip("damageest_app.running.results")
     text = small_done.read_text().replace("report: none", "report: {use: html, pdf: true}")
     small_done.write_text(text + "allowance: {use: milling, outer: 0.5, inner: 0.4}\n")
     done = CliRunner().invoke(app, ["run", str(small_done)])

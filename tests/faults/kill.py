@@ -38,7 +38,7 @@ from tests import damaged_box
 MAIN = "from damageest.cli import main; main()"
 APP = """import pathlib, signal, sys
 signal.signal(signal.SIGINT, signal.SIG_DFL)
-from damageest_app.runner import Runner
+from damageest_app.running.runner import Runner
 done = Runner().call(sys.argv[1:], pathlib.Path())
 sys.stdout.write(done.printed)
 sys.stderr.write(done.messages)

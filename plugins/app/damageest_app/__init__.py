@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from damageest import hookimpl
-from damageest_app import events
+from damageest_app.running import events
 
 if TYPE_CHECKING:
     import typer

@@ -92,7 +92,7 @@ class Folder:
         found = path.parent / "out" / path.stem / "result.json"
         try:
             content = json.loads(found.read_text(encoding="utf-8"))
-            from damageest_app.results import format_interval
+            from damageest_app.running.results import format_interval
 
             for site in content["sites"]:
                 row[site["verdict"]["level"]] += 1

@@ -19,8 +19,8 @@ from damageest.geometry.units import diagnose_scale, diagnose_size, unit_factor
 from damageest.job import Job, load
 from damageest.registry import Registry
 from damageest.stages.scan import ReadScan
-from damageest_app.scene import thin
-from damageest_app.shade import shade_points
+from damageest_app.view.scene import thin
+from damageest_app.view.shade import shade_points
 
 UNITS = {"mm": "mm", "in": "inches", "cm": "cm", "m": "metres", "um": "micrometres", "ft": "feet"}
 """Units that are offered, the likeliest mistake first, with their names."""

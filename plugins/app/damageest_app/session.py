@@ -12,14 +12,14 @@ from typing import Any, TypeVar
 
 from damageest.errors import DamageestError, clean_message
 from damageest.registry import Registry
-from damageest_app.faces import Faces
 from damageest_app.folder import Folder
 from damageest_app.inputs import Inputs, Reader
 from damageest_app.jobfile import ConflictError, Edit, JobFile
-from damageest_app.pick import MeshPicker, Ray
-from damageest_app.results import Results
-from damageest_app.runs import Runs
-from damageest_app.scene import Scene
+from damageest_app.running.results import Results
+from damageest_app.running.runs import Runs
+from damageest_app.view.faces import Faces
+from damageest_app.view.pick import MeshPicker, Ray
+from damageest_app.view.scene import Scene
 
 T = TypeVar("T")
 STEPS = ("open", "prepare", "align", "judge", "repair", "several")

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import trimesh
 from damageest_app import edits
-from damageest_app.faces import Faces
 from damageest_app.folder import Folder, guess_inputs
-from damageest_app.histogram import Histogram
-from damageest_app.pathview import PathPlay, make_nozzle
-from damageest_app.pick import MeshPicker, Ray, find_point
-from damageest_app.runner import Progress, Runner, describe_end
-from damageest_app.section import Cutter, choose_plane, draw, measure_depth
+from damageest_app.running.runner import Progress, Runner, describe_end
+from damageest_app.view.faces import Faces
+from damageest_app.view.histogram import Histogram
+from damageest_app.view.pathview import PathPlay, make_nozzle
+from damageest_app.view.pick import MeshPicker, Ray, find_point
+from damageest_app.view.section import Cutter, choose_plane, draw, measure_depth
 from ruamel.yaml import YAML
 
 from damageest.artefacts import Mesh, Part
@@ -182,7 +182,7 @@ def test_part_and_scan_are_chosen_where_there_is_no_choice(
 def test_what_a_path_leaves_out_is_told_in_red_from_a_twentieth() -> None:
     from types import SimpleNamespace
 
-    from damageest_app.results import Results
+    from damageest_app.running.results import Results
 
     def path(volume: float, why: str) -> dict[str, object]:
         return {

@@ -11,15 +11,15 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Mesh
 from damageest.io.colours import PART
 from damageest_app import edits
-from damageest_app.colours import colour_deviation, make_legend
 from damageest_app.panels.datum import DatumTool
 from damageest_app.panels.marks import mark
 from damageest_app.panels.pairs import PairsTool
 from damageest_app.panels.shown import SCAN
-from damageest_app.pick import Ray
-from damageest_app.scene import Scene, make_mesh, make_points
 from damageest_app.session import Panel, Session
-from damageest_app.shade import tint
+from damageest_app.view.colours import colour_deviation, make_legend
+from damageest_app.view.pick import Ray
+from damageest_app.view.scene import Scene, make_mesh, make_points
+from damageest_app.view.shade import tint
 
 
 class AlignPanel(Panel):

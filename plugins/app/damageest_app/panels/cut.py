@@ -9,8 +9,8 @@ from trame.widgets import vuetify3 as v3
 from damageest.artefacts import Flags, Floats
 from damageest_app import edits
 from damageest_app.panels.marks import mark
-from damageest_app.pick import Ray
 from damageest_app.session import Panel, Session
+from damageest_app.view.pick import Ray
 
 
 class CutTool(Panel):

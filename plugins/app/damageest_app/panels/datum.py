@@ -10,9 +10,9 @@ from trame.widgets import vuetify3 as v3
 from damageest_app import edits
 from damageest_app.panels.marks import mark
 from damageest_app.panels.shown import put_faces
-from damageest_app.pick import Ray
-from damageest_app.scene import Scene
 from damageest_app.session import Panel, Session
+from damageest_app.view.pick import Ray
+from damageest_app.view.scene import Scene
 
 COLOURS = ("#2fa84f", "#2f86d6", "#e0902f")
 """Of the datums by their precedence."""

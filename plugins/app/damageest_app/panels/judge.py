@@ -11,10 +11,20 @@ from trame.widgets import vuetify3 as v3
 from damageest.io.colours import PART, SURPLUS, UNSEEN, colour_site
 from damageest_app import edits
 from damageest_app.panels.marks import mark
-from damageest_app.pick import MeshPicker, Ray
-from damageest_app.scene import Scene, lift, make_lines, make_mesh, make_points
-from damageest_app.section import HEIGHT, WIDTH, Cutter, Drawing, Plane, choose_plane, draw, measure_depth, to_space
 from damageest_app.session import Panel, Session
+from damageest_app.view.pick import MeshPicker, Ray
+from damageest_app.view.scene import Scene, lift, make_lines, make_mesh, make_points
+from damageest_app.view.section import (
+    HEIGHT,
+    WIDTH,
+    Cutter,
+    Drawing,
+    Plane,
+    choose_plane,
+    draw,
+    measure_depth,
+    to_space,
+)
 
 MOST_WARM = 20
 """Sites whose section is prepared before a click asks for it."""

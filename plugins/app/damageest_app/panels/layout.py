@@ -16,8 +16,8 @@ from damageest_app.panels.open import OpenPanel
 from damageest_app.panels.prepare import PreparePanel
 from damageest_app.panels.repair import RepairPanel
 from damageest_app.panels.several import SeveralPanel
-from damageest_app.pick import Ray
 from damageest_app.session import STEPS, Session
+from damageest_app.view.pick import Ray
 
 ICONS = ("mdi-folder-open-outline", "mdi-crop", "mdi-axis-arrow", "mdi-scale-balance", "mdi-layers-triple-outline",
          "mdi-table")  # fmt: skip

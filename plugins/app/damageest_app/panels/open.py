@@ -15,8 +15,8 @@ from damageest_app.folder import guess_inputs
 from damageest_app.inputs import UNITS
 from damageest_app.panels.marks import mark
 from damageest_app.panels.shown import place_beside, put_scan
-from damageest_app.scene import Scene, make_mesh
 from damageest_app.session import Panel, Session
+from damageest_app.view.scene import Scene, make_mesh
 
 
 class OpenPanel(Panel):

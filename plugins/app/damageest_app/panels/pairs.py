@@ -13,9 +13,9 @@ from damageest.io.colours import PART
 from damageest_app import edits
 from damageest_app.panels.marks import mark
 from damageest_app.panels.shown import place_beside, put_scan
-from damageest_app.pick import Ray, find_point
-from damageest_app.scene import Scene, make_mesh
 from damageest_app.session import Panel, Session
+from damageest_app.view.pick import Ray, find_point
+from damageest_app.view.scene import Scene, make_mesh
 
 COLOURS = ("#e0218a", "#00a3a3", "#7a3ff2", "#b58900", "#2f86d6", "#5a5a5a")
 

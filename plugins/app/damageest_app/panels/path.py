@@ -10,11 +10,11 @@ from trame.widgets import vuetify3 as v3
 
 from damageest.io.colours import VIRIDIS
 from damageest_app import edits
-from damageest_app.colours import spread
 from damageest_app.panels.marks import mark
-from damageest_app.pathview import PathPlay, make_nozzle
-from damageest_app.scene import Scene, make_lines, make_mesh
 from damageest_app.session import Panel, Session
+from damageest_app.view.colours import spread
+from damageest_app.view.pathview import PathPlay, make_nozzle
+from damageest_app.view.scene import Scene, make_lines, make_mesh
 
 NUMBERS = (
     ("width", "bead width"), ("height", "layer height"), ("feed", "feed a minute"), ("standoff", "standoff"),

@@ -10,13 +10,13 @@ from trame.widgets import vuetify3 as v3
 
 from damageest.artefacts import Floats
 from damageest_app import edits
-from damageest_app.histogram import Histogram
 from damageest_app.panels.cut import CutTool
 from damageest_app.panels.marks import mark
 from damageest_app.panels.shown import put_scan
-from damageest_app.pick import Ray
-from damageest_app.scene import Scene, make_lines, thin
 from damageest_app.session import Panel, Session
+from damageest_app.view.histogram import Histogram
+from damageest_app.view.pick import Ray
+from damageest_app.view.scene import Scene, make_lines, thin
 
 AXES = "xyz"
 

@@ -14,9 +14,9 @@ from damageest_app import edits
 from damageest_app.panels.marks import mark
 from damageest_app.panels.path import PathTool, to_length
 from damageest_app.panels.shown import put_faces
-from damageest_app.pick import Ray
-from damageest_app.scene import Scene, lift, make_mesh
 from damageest_app.session import Panel, Session
+from damageest_app.view.pick import Ray
+from damageest_app.view.scene import Scene, lift, make_mesh
 
 STOCK, KEEP_OUT = "#e0902f", "#c0392b"
 FORMATS = ("stl", "3mf", "ply", "step")

@@ -6,8 +6,8 @@ from trame.widgets import html
 from trame.widgets import vuetify3 as v3
 
 from damageest_app.panels.marks import mark
-from damageest_app.scene import Scene
 from damageest_app.session import Panel, Session
+from damageest_app.view.scene import Scene
 
 
 class SeveralPanel(Panel):

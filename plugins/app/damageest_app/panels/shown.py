@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
-from damageest_app.faces import Faces
 from damageest_app.inputs import Inputs
-from damageest_app.scene import Scene, make_mesh, make_points, to_rgb
-from damageest_app.shade import tint
+from damageest_app.view.faces import Faces
+from damageest_app.view.scene import Scene, make_mesh, make_points, to_rgb
+from damageest_app.view.shade import tint
 
 SCAN = "#d97a34"
 REMOVED = "#e0218a"

@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from damageest_app.events import PIPE
+from damageest_app.running.events import PIPE
 
 LEASH = "DAMAGEEST_APP_LEASH"
 """The environment variable with the number of a pipe whose other end the app holds open as long as it lives."""

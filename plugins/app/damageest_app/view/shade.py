@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats
 from damageest.geometry.neighbourhoods import find_neighbours
-from damageest_app.scene import to_rgb
+from damageest_app.view.scene import to_rgb
 
 COUNT = 10
 """Neighbours that a direction is estimated from."""

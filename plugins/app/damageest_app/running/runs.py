@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from damageest_app.runner import Outcome, Progress, Runner, describe_end
+from damageest_app.running.runner import Outcome, Progress, Runner, describe_end
 
 if TYPE_CHECKING:
     from damageest_app.session import Session
