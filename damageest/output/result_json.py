@@ -10,13 +10,11 @@ from damageest.artefacts import Part, Scan
 from damageest.findings import NoiseLevel, Sensor, VariogramPoint
 from damageest.output.adapt_json import AdaptReport, report_adapt
 from damageest.output.base import JsonModel
-from damageest.output.deviation_json import DeviationReport, report_deviation
-from damageest.output.fit_json import report_fit
-from damageest.output.pose_json import AlignmentReport, report_alignment
+from damageest.output.pose_json import AlignmentReport, report_alignment, report_fit
 from damageest.output.provenance import ProvenanceReport
 from damageest.output.section_json import report_section
 from damageest.output.site_json import MaterialReport, index_files, report_site, sum_material
-from damageest.output.skin_json import report_surplus
+from damageest.output.skin_json import DeviationReport, report_deviation, report_surplus
 from damageest.output.uncertainty_json import ReportedInterval
 from damageest.result import Result, StageRecord, StepRecord
 from damageest.stages.export import ExportedFiles

@@ -9,7 +9,7 @@ import pytest
 
 from damageest.errors import StageError
 from damageest.job import yamlfile
-from damageest.output.deviation_json import report_deviation
+from damageest.output.skin_json import report_deviation
 from damageest.pipeline.finding.fallback import drop_tried
 from tests import damaged_box
 from tests.cli.calls import call
