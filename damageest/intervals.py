@@ -131,6 +131,14 @@ class Uncertainty:
     fading: Annotated[Fading | None, "volumes of a shallow loss by counted depth; null for a sharp rim"] = None
     certain: float = 0.0
 
+    def measure(self, term: str) -> float:
+        """The standard deviation of the volume by a term; that of a plugin is in the budget alone. 0 where it has
+        none."""
+        if term in vars(self):
+            return float(getattr(self, term))
+        rows = self.budget.rows if self.budget else ()
+        return next((row.contribution for row in rows if row.source == term), 0.0)
+
     @property
     def is_open(self) -> bool:
         """Whether the scan leaves the size of the loss without an upper limit."""

@@ -20,7 +20,7 @@ PUBLIC_NAMES = {
     "damageest.isolation": set(isolation.__all__),
     "damageest.job": set(job.__all__),
     "damageest.registry": set(registry_package.__all__),
-    "damageest.rules": {"Rule", "SiteCase", "SiteFacts", "ScanFacts", "FreePose"},
+    "damageest.rules": {"Rule", "SiteCase", "SiteFacts", "ScanFacts", "FreePose", "Term", "Share", "LossCase"},
 }
 """Packages of which only the names that they list are public, without their modules."""
 PUBLIC_MODULES = {

@@ -18,6 +18,7 @@ WIDTH = 100
 EXIT = "exit"
 """The word for the table of exit statuses."""
 REASONS_PAGE = "docs/verdicts.md#reasons"
+TERMS_PAGE = "docs/uncertainty.md#what-a-result-says"
 
 
 def command(
@@ -51,9 +52,14 @@ def _collect() -> list[dict[str, Any]]:
     from damageest.rules.notes import RUN_CODES
     from damageest.trust.doubts.pose import POSE_CODES
 
-    rules = {rule.code: rule for rule in Registry.discover().rules}
+    registry = Registry.discover()
+    rules = {rule.code: rule for rule in registry.rules}
     meanings = {**POSE_CODES, **{code: one.meaning for code, one in RUN_CODES.items()}}
     reasons = {code: _make_reason(code, rules.get(code), meanings.get(code, "")) for code in [*rules, *meanings]}
+    terms = [
+        {"word": term.name, "kind": "term", "meaning": term.text, "remedy": term.remedy, "page": TERMS_PAGE}
+        for term in registry.terms
+    ]
     errors = [
         {"word": code, "kind": "error", "meaning": one.meaning, "remedy": one.remedy, "page": one.page,
          "exit": one.status}
@@ -64,7 +70,7 @@ def _collect() -> list[dict[str, Any]]:
          "page": "docs/command-line.md#exit-statuses"}
         for status, meaning in EXIT_STATUSES.items()
     ]  # fmt: skip
-    return [*map(_make_topic, make_topics(rules.values())), *reasons.values(), *errors, *statuses]
+    return [*map(_make_topic, make_topics(rules.values())), *reasons.values(), *terms, *errors, *statuses]
 
 
 def _make_topic(topic: Topic) -> dict[str, Any]:
@@ -113,7 +119,8 @@ def _describe(one: dict[str, Any]) -> str:
     if one["kind"] == "exit status":
         return _wrap(f"exit status {one['exit']}: {one['meaning']}")
     status = f" (error, exit status {one['exit']})" if one["kind"] == "error" else ""
-    lines = [f"{one['word']}{status}: {one['meaning']}"]
+    term = " (term of the interval)" if one["kind"] == "term" else ""
+    lines = [f"{one['word']}{status}{term}: {one['meaning']}"]
     lines += [f"given from: {one['given_from']}"] if one.get("given_from") else []
     lines += [f"what to do: {one['remedy']}"] if one["remedy"] else []
     return "\n".join(map(_wrap, [*lines, f"see {one['page']}"]))

@@ -38,7 +38,7 @@ def command(
     with keep_for_results(for_good=_process.is_command):
         registry = Registry.discover()
         if which is SchemaName.reasons:
-            say_result(format_reasons(registry.rules).rstrip("\n"))
+            say_result(format_reasons(registry.rules, registry.terms).rstrip("\n"))
             return
         if which is SchemaName.errors:
             say_result(format_errors().rstrip("\n"))

@@ -262,6 +262,7 @@ def start(engine: Engine) -> JobState:
         stage = job.stages.get(contract)
         state = state.with_named(name, stage, digest(str(stage and stage.model_dump())))
     state = state.with_value(JobState.rules, registry.rules, digest([rule.code for rule in registry.rules]))
+    state = state.with_value(JobState.terms, registry.terms, digest([term.name for term in registry.terms]))
     state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
     state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
     state = state.with_value(JobState.conversions, registry.conversions, digest(sorted(registry.conversions)))

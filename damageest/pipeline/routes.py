@@ -137,15 +137,15 @@ CLOSE: Route = (
     weigh_scanner,  # scanner, temperature, corrected_scale, fitted, field, pose_error, facts, unit
     #     -> scanner_errors, +warnings
     measure_uncertainty,  # found, part, aligned, field, adapted, skin, coverage, facts, fitted, pose, pose_error,
-    #     scanner_errors, tolerance, unit, adapter, warnings -> found
-    judge_sites,  # found, accept, rules, facts, field, skin, coverage, pose, unit, views, aligner -> found
+    #     scanner_errors, terms, tolerance, unit, adapter, warnings -> found
+    judge_sites,  # found, accept, rules, terms, facts, field, skin, coverage, pose, unit, views, aligner -> found
     dismiss_explained_sites,  # found, sensor, explained, sheets, aligner, accept, tolerance, asked_tolerance, unit,
     #     field -> found, folded, +warnings
     review_model_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings
     #     -> fitted, warnings
     make_deposits,  # calls Allowance: found, part, tolerance -> found, +failures
     plan_paths,  # calls Path: found, part, tolerance, reach -> found, +failures
-    sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, scanner_errors, unit
+    sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, unit
     #     -> volume_95, budget
     cut_sections,  # asked_sections, field, adapted, pose_error, sensor, unit -> sections, +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, field, pose, deviation, sites, found, failures,

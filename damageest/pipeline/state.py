@@ -44,7 +44,7 @@ from damageest.job.sections import SectionChoice
 from damageest.pipeline.cache import digest
 from damageest.pipeline.registration import Registration
 from damageest.result import Conversion, Result
-from damageest.rules import Rule, ScanFacts
+from damageest.rules import Rule, ScanFacts, Term
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.enclose import Enclose, EncloseAll
@@ -219,7 +219,7 @@ class JobState(State):
 
     From the job and the registry: ``name``, ``unit``, ``asked_tolerance`` (None: `auto`), ``choice`` of sites,
     ``accept``, ``asked_sections``, ``scanner`` and ``temperature`` (None: the job does not tell), the stages whose
-    options steps read (None where the job's route has none), and ``rules``, ``writers``, ``path_writers``,
+    options steps read (None where the job's route has none), and ``rules``, ``terms``, ``writers``, ``path_writers``,
     ``reach`` (see the stage `path`) and ``conversions``. ``tolerance``: None until it is measured where the job says
     `auto`. ``measured_noise`` and
     ``measured_spacing``: of the scan before it is aligned; ``depth_step``: of its depth, 0 where it is continuous.
@@ -253,6 +253,7 @@ class JobState(State):
     encloser = Value[Enclose | None]()
     encloser_at_once = Value[EncloseAll | None]()
     rules = Value[tuple[Rule, ...]]()
+    terms = Value[tuple[Term, ...]]()
     writers = Value[Mapping[str, Writer]]()
     reach = Value[Floats | None]()
     path_writers = Value[Mapping[str, PathWriter]]()

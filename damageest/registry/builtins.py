@@ -9,7 +9,7 @@ from damageest.registry.hookspecs import hookimpl
 
 if TYPE_CHECKING:
     from damageest.result import Conversion
-    from damageest.rules import Rule
+    from damageest.rules import Rule, Term
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
 
@@ -74,6 +74,14 @@ def damageest_rules() -> list[type[Rule]]:
     from damageest.trust.doubts import list_rules
 
     return list_rules()
+
+
+@hookimpl
+def damageest_terms() -> list[type[Term]]:
+    """Every built-in term of the intervals, in the order of the rows of a budget."""
+    from damageest.trust.terms import list_terms
+
+    return list_terms()
 
 
 @hookimpl

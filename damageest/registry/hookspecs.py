@@ -1,4 +1,4 @@
-"""The hooks a plugin may implement: seven that add, five that only observe.
+"""The hooks a plugin may implement: eight that add, five that only observe.
 
 What is computed is decided by the job file alone, so a result can be reproduced from it: observers get values, and
 what they return is ignored.
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
     from damageest.artefacts import Floats
     from damageest.result import Conversion
-    from damageest.rules import Rule
+    from damageest.rules import Rule, Term
     from damageest.stages import Stage
     from damageest.stages.export import PathWriter, Writer
 
@@ -57,6 +57,12 @@ def damageest_conversions() -> Mapping[str, Conversion]:  # type: ignore[empty-b
 @hookspec
 def damageest_rules() -> Sequence[type[Rule]]:  # type: ignore[empty-body]
     """Gives the rules that this plugin adds: each looks at the facts about a site and gives reasons for its verdict."""
+
+
+@hookspec
+def damageest_terms() -> Sequence[type[Term]]:  # type: ignore[empty-body]
+    """Gives the terms that this plugin adds to the intervals: each measures what a source of uncertainty makes of a
+    volume."""
 
 
 @hookspec

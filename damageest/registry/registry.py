@@ -21,7 +21,7 @@ from damageest.registry.contracts import DEFAULTS, STAGES, SURFACE_ONLY, Contrac
 from damageest.registry.guards import compute_joints, guard_conversion, guard_path_writer, guard_writer
 from damageest.registry.loading import OWN, Broken, Provider, describe_broken, ignore_shadow_warnings, load
 from damageest.result import Conversion
-from damageest.rules import RULE_FAILED, Rule
+from damageest.rules import RULE_FAILED, Rule, Term
 from damageest.rules.notes import RUN_CODES
 from damageest.stages import Stage
 from damageest.stages.enclose import EncloseAll
@@ -55,7 +55,8 @@ class Implementation:
 class Registry:
     """All implementations that were found. ``clashes`` are names that two distributions provide: no job can use them.
     ``writers``: the formats that `export` can write, by name; ``formats``: the provider of each. ``path_writers``: the
-    formats of paths, by name. ``conversions``: of results, by name. ``rules``: those that give reasons for verdicts."""
+    formats of paths, by name. ``conversions``: of results, by name. ``rules``: those that give reasons for verdicts.
+    ``terms``: of the intervals."""
 
     implementations: tuple[Implementation, ...]
     providers: tuple[Provider, ...]
@@ -67,6 +68,7 @@ class Registry:
     path_writers: Mapping[str, PathWriter] = field(default_factory=dict, compare=False)
     conversions: Mapping[str, Conversion] = field(default_factory=dict, compare=False)
     rules: tuple[Rule, ...] = field(default=(), compare=False)
+    terms: tuple[Term, ...] = field(default=(), compare=False)
 
     @classmethod
     def discover(cls, observers: Iterable[object] = ()) -> Registry:
@@ -78,6 +80,7 @@ class Registry:
         formats: dict[str, Provider] = {}
         conversions: dict[str, Conversion] = {}
         rules: dict[str, Rule] = {}
+        terms: dict[str, Term] = {}
         for plugin, provider in loaded:
             try:
                 with ignore_shadow_warnings():
@@ -85,7 +88,8 @@ class Registry:
                     added = _read_writers(plugin, "damageest_writers", Writer, writers)
                     added_paths = _read_writers(plugin, "damageest_path_writers", PathWriter, path_writers)
                     converts = _read_conversions(plugin, conversions)
-                    added_rules = _read_rules(plugin, rules, provider)
+                    added_rules = _read_told(plugin, Rule, rules, provider)  # type: ignore[type-abstract]
+                    added_terms = _read_told(plugin, Term, terms, provider)  # type: ignore[type-abstract]
                     if provider.name != OWN:
                         added = {name: guard_writer(name, one, f"{provider}") for name, one in added.items()}
                         added_paths = {
@@ -98,6 +102,7 @@ class Registry:
             writers |= added
             path_writers |= added_paths
             rules |= added_rules
+            terms |= added_terms
             formats |= dict.fromkeys(added, provider)
             conversions |= converts
             for stage in classes:
@@ -114,7 +119,7 @@ class Registry:
         providers = tuple(dict.fromkeys([p for _, p in loaded] + [b.provider for b in broken]))
         made = cls(
             single, providers, tuple(broken), clashes, manager, writers, formats, path_writers, conversions,
-            tuple(rules.values()),
+            tuple(rules.values()), tuple(terms.values()),
         )  # fmt: skip
         for kind, package in bundled.CONVERSIONS.items():
             if kind not in conversions:
@@ -236,27 +241,33 @@ def _refuse(why: str, *values: object) -> NoReturn:
     raise InputError(why)
 
 
-def _read_rules(plugin: Any, known: Mapping[str, Rule], provider: Provider) -> dict[str, Rule]:
-    """The rules that a plugin adds, by their code. Raises PluginError for what is no rule, or has a code twice, or one
-    that damageest gives itself."""
-    found = plugin.damageest_rules() if hasattr(plugin, "damageest_rules") else []
-    rules: dict[str, Rule] = {}
-    for cls in found:
-        if not (isinstance(cls, type) and issubclass(cls, Rule)):
-            raise PluginError(f"its hook damageest_rules gave {cls!r}, which is not a class derived from Rule")
-        named = ("code", "meaning", "threshold")
-        if missing := [name for name in named if not isinstance(getattr(cls, name, None), str)]:
-            raise PluginError(f"its rule {cls.__qualname__} has no {', no '.join(missing)}")
-        if cls.code in known or cls.code in rules:
-            raise PluginError(f"its rule {cls.__qualname__} has the code '{cls.code}', which another rule has")
-        if provider.name != OWN and cls.code in RESERVED:
+T = TypeVar("T", bound=Rule | Term)
+HAS = {Rule: ("code", "meaning", "threshold"), Term: ("name", "text", "type")}
+"""What a rule and a term have to have; the first is what they are known by."""
+
+
+def _read_told(plugin: Any, base: type[T], known: Mapping[str, T], provider: Provider) -> dict[str, T]:
+    """The rules or the terms that a plugin adds, by code or name. Raises PluginError for what is none, or has the name
+    of another, or one that damageest gives itself."""
+    what = "rule" if issubclass(base, Rule) else "term"
+    hook, names = f"damageest_{what}s", HAS[base]
+    told: dict[str, T] = {}
+    for cls in getattr(plugin, hook)() if hasattr(plugin, hook) else ():
+        if not (isinstance(cls, type) and issubclass(cls, base)):
+            raise PluginError(f"its hook {hook} gave {cls!r}, which is not a class derived from {base.__name__}")
+        if missing := [name for name in names if not isinstance(getattr(cls, name, None), str)]:
+            raise PluginError(f"its {what} {cls.__qualname__} has no {', no '.join(missing)}")
+        key = getattr(cls, names[0])
+        if key in known or key in told:
+            raise PluginError(f"its {what} {cls.__qualname__} has the {names[0]} '{key}', which another {what} has")
+        if provider.name != OWN and key in RESERVED:
             raise PluginError(
-                f"its rule {cls.__qualname__} has the code '{cls.code}', which damageest gives itself; choose another, "
-                f"for example {provider.name.removeprefix('damageest-').replace('-', '_')}_{cls.code}"
+                f"its {what} {cls.__qualname__} has the {names[0]} '{key}', which damageest gives itself; choose "
+                f"another, for example {provider.name.removeprefix('damageest-').replace('-', '_')}_{key}"
             )
-        rules[cls.code] = cls()
-        rules[cls.code].owner = "" if provider.name == OWN else f"{provider}"
-    return rules
+        told[key] = cls()
+        told[key].owner = "" if provider.name == OWN else f"{provider}"
+    return told
 
 
 def check_defaults(cls: type[Stage]) -> None:

@@ -85,7 +85,8 @@ class SiteFacts:
     may be dented there, else 0. ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no
     scan point shows, and ``beyond_words``: how it was found. ``shut`` and ``turned``: shares of its inner surface that
     could be seen from nowhere, and only from where the skin beside it was not seen. ``other_volume``: by the other
-    method; None where that was not asked, NaN where it gave none. ``measured``: what rules of plugins measured, by
+    method; None where that was not asked, NaN where it gave none. ``terms``: of the interval, those of plugins
+    among them. ``measured``: what rules of plugins measured, by
     their names; ``failed``: why a rule could not measure, by its code.
     """
 
@@ -119,6 +120,7 @@ class SiteFacts:
     other_volume: float | None = None
     contradicted: int = 0
     contradicted_share: float = 0.0
+    terms: tuple[Any, ...] = ()
     measured: Mapping[str, Any] = field(default_factory=dict)
     failed: Mapping[str, Reason] = field(default_factory=dict)
 

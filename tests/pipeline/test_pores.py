@@ -7,9 +7,10 @@ import pytest
 import trimesh
 
 import damageest
-from damageest.trust.interval.site_error import SiteError, combine_total
+from damageest.trust.interval.site_error import combine_total
 from tests.geometry.shapes import ball, box
 from tests.scenes import spread
+from tests.trust.errors import make_error
 
 RADIUS, NOISE = 2.0, 0.02
 
@@ -40,7 +41,7 @@ def test_a_pore_is_a_site_of_its_own_and_in_no_deposit() -> None:
 
 
 def test_a_volume_that_no_pose_moves_adds_to_one_that_a_pose_moves() -> None:
-    moved = SiteError(100.0, 1.0, 0.0, 0.0, 0.0, pose=np.array([3.0, 0.0]))
-    still = SiteError(50.0, 0.0, 0.0, 0.0, 0.0)
+    moved = make_error(100.0, noise=1.0, pose=np.array([3.0, 0.0]))
+    still = make_error(50.0)
     alone, together = combine_total(100.0, [moved]), combine_total(150.0, [moved, still])
     assert np.subtract(together, alone) == pytest.approx([50.0, 50.0])

@@ -14,7 +14,9 @@ PAGE = Path(__file__).parents[2] / "docs" / "verdicts.md"
 
 
 def test_the_page_has_the_tables_of_the_rules() -> None:
-    table = format_reasons([rule() for rule in builtins.damageest_rules()])
+    table = format_reasons(
+        [rule() for rule in builtins.damageest_rules()], [term() for term in builtins.damageest_terms()]
+    )
     between = PAGE.read_text().partition("<!-- reasons: begin -->\n")[2].partition("<!-- reasons: end -->")[0]
     assert between == table, "write it anew: damageest schema reasons"
 

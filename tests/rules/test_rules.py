@@ -141,14 +141,14 @@ class Plugin:
 def test_a_plugin_adds_a_rule_and_one_that_is_none_is_refused() -> None:
     from damageest.errors import PluginError
     from damageest.registry.loading import Provider
-    from damageest.registry.registry import _read_rules
+    from damageest.registry.registry import _read_told
 
     acme = Provider("acme", "1", "MIT", "acme")
 
-    assert set(_read_rules(Plugin(Rust), RULES, acme)) == {"rust"}
+    assert set(_read_told(Plugin(Rust), Rule, RULES, acme)) == {"rust"}
     for wrong in (Rust(), int, type("Twice", (Rust,), {"code": "displaced"}), type("Mute", (Rust,), {"meaning": None})):
         with pytest.raises(PluginError):
-            _read_rules(Plugin(wrong), RULES, acme)
+            _read_told(Plugin(wrong), Rule, RULES, acme)
 
 
 def test_a_rule_by_the_former_name_of_its_method_is_read() -> None:

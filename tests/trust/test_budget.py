@@ -10,23 +10,20 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from damageest.findings import Budget
-from damageest.trust.interval.budget import SOURCES, make_depth_budget, make_volume_budget
-from damageest.trust.interval.scanner import ScannerErrors, Term, leave_form, spread_of
-from damageest.trust.interval.site_error import WIDTH, SiteError, combine_total
+from damageest.trust.interval.budget import make_depth_budget, make_volume_budget
+from damageest.trust.interval.scanner import leave_form, spread_of
+from damageest.trust.interval.site_error import WIDTH, Share, SiteError, combine_total
 from tests.needs import import_or_skip
+from tests.trust.errors import FIGURES, TERMS, change, make_error, take
 
 SIZES = st.floats(0.0, 10.0)
 SIGNED = st.floats(-5.0, 5.0)
-SCANNER = ScannerErrors(
-    (Term("probing_size", 0.01, "mm", 0.5, "normal"), Term("length", 2e-4, "", 1.0, "rectangular")), form=0.004
-)
 ERRORS = st.builds(
-    SiteError,
+    make_error,
     volume=st.floats(1000.0, 2000.0),
     noise=SIZES,
     spacing=SIZES,
     rim=SIZES,
-    excess=st.just(0.0),
     pose=st.lists(SIGNED, min_size=6, max_size=6).map(np.array),
     tessellation=SIZES,
     form=SIZES,
@@ -38,11 +35,11 @@ ERRORS = st.builds(
     exposed=st.floats(1.0, 100.0),
 )
 SHARED = ("spacing", "rim", "form", "tessellation", "outward", "views")
-PLAIN = SiteError(100.0, 0.0, 0.0, 0.0, 0.0, scanner=np.array([2.0, 0.0]), exposed=10.0)
+PLAIN = make_error(100.0, probing_form=0.0, scanner=np.array([2.0, 0.0]), exposed=10.0)
 
 
 def make(errors: list[SiteError]) -> Budget:
-    budget = make_volume_budget(errors, SCANNER, 0.02, 0.01, "mm")
+    budget = make_volume_budget(errors, "mm")
     assert budget is not None
     return budget
 
@@ -66,15 +63,15 @@ def test_two_sites_have_the_uncertainty_of_the_gum_tree_calculator() -> None:
         rng = np.random.default_rng(seed)
         one = {name: float(rng.uniform(1, 5)) for name in (*SHARED, "noise", "probing_form")}
         pose, adapt, told = (rng.normal(size=count) for count in (6, 3, 2))
-        return SiteError(1000.0, excess=0.0, pose=pose, adapt=adapt, scanner=told, exposed=10.0, **one)
+        return make_error(1000.0, pose=pose, adapt=adapt, scanner=told, exposed=10.0, **one)
 
     sites = [draw(1), draw(2)]
     inputs = {name: ureal(0, 1) for name in (*SHARED, *range(11))}
     total = ureal(0, 1) * 0
     for one in sites:
-        total += one.noise * ureal(0, 1) + one.probing_form * ureal(0, 1)
-        total += sum(getattr(one, name) * inputs[name] for name in SHARED)
-        signed = np.concatenate([one.pose, one.adapt, one.scanner])
+        total += float(take(one, "noise")[0]) * ureal(0, 1) + float(take(one, "probing_form")[0]) * ureal(0, 1)
+        total += sum(float(take(one, name)[0]) * inputs[name] for name in SHARED)
+        signed = np.concatenate([take(one, name) for name in ("pose", "adapt", "probing_size", "length")])
         total += sum(float(c) * inputs[k] for k, c in enumerate(signed))
     assert make(sites).combined == pytest.approx(total.u, rel=1e-12)
 
@@ -84,18 +81,18 @@ def test_two_sites_have_the_uncertainty_of_the_gum_tree_calculator() -> None:
 def test_uncertainty_times_sensitivity_is_the_contribution(error: SiteError) -> None:
     for row in make([error]).rows:
         assert row.uncertainty * abs(row.sensitivity) == pytest.approx(row.contribution)
-        assert row.source in SOURCES
+        assert row.source in TERMS
 
 
 def test_an_offset_cancels_between_sites_that_it_moves_against_each_other() -> None:
-    other = replace(PLAIN, scanner=-PLAIN.scanner)
+    other = change(PLAIN, scanner=np.array([-2.0, 0.0]))
     assert make([PLAIN]).combined == pytest.approx(2)
     assert make([PLAIN, PLAIN]).combined == pytest.approx(4)
     assert make([PLAIN, other]).combined == pytest.approx(0)
 
 
 def test_a_figure_of_the_certificate_has_its_row_though_it_changes_nothing() -> None:
-    rows = {row.source: row for row in make([replace(PLAIN, scanner=np.zeros(2))]).rows}
+    rows = {row.source: row for row in make([change(PLAIN, scanner=np.zeros(2))]).rows}
     assert {"probing_size", "length", "probing_form"} <= set(rows)
     assert rows["length"].distribution == "rectangular"
 
@@ -107,17 +104,19 @@ def test_what_moves_one_end_is_a_bound_and_no_row() -> None:
 
 
 def test_the_budget_of_the_depth_has_its_error() -> None:
-    by = {"noise": 0.03, "spacing": 0.04, "pose": 0.0}
-    error = replace(PLAIN, depth=5.0, depth_error=0.13, depth_by=by, depth_scanner=np.array([-0.12, 0.0]))
-    budget = make_depth_budget(error, SCANNER, "mm")
+    by = {"noise": 0.03, "spacing": 0.04, "pose": 0.0, "probing_size": -0.12}
+    shares = tuple((TERMS[name], Share(0.0, depth, figure=FIGURES.get(name))) for name, depth in by.items())
+    error = replace(PLAIN, depth=5.0, shares=shares)
+    assert error.depth_error == pytest.approx(0.13)
+    budget = make_depth_budget(error, "mm")
     assert budget is not None
     assert budget.combined == pytest.approx(error.depth_error)
     assert [row.sensitivity for row in budget.rows if row.source == "probing_size"] == pytest.approx([-12.0])
 
 
 def test_no_measured_site_no_budget() -> None:
-    assert make_volume_budget([], SCANNER, 0.02, 0.0, "mm") is None
-    assert make_depth_budget(SiteError(5.0, 0.0, 0.0, 0.0, 0.0), SCANNER, "mm") is None
+    assert make_volume_budget([], "mm") is None
+    assert make_depth_budget(SiteError(5.0), "mm") is None
 
 
 def test_limits_are_rectangular_and_expanded_uncertainties_normal() -> None:

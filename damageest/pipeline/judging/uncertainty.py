@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cached_property
 
 import numpy as np
@@ -25,19 +25,24 @@ from damageest.trust.interval.budget import make_depth_budget, make_volume_budge
 from damageest.trust.interval.fading import measure_fading
 from damageest.trust.interval.free_pose import measure_dependence, measure_hidden_wear
 from damageest.trust.interval.inner_surface import measure_inner_surface
+from damageest.trust.interval.loss import Loss, LossCase, ScanErrors, measure_shifts
 from damageest.trust.interval.pose_error import PoseError
+from damageest.trust.interval.scanner import TERMS
 from damageest.trust.interval.shallow_loss import limit_shallow_loss
 from damageest.trust.interval.site_error import (
     WIDTH,
+    Share,
     SiteError,
     combine_site,
     combine_total,
     measure_certain,
     sum_free,
 )
-from damageest.trust.interval.uncertainty import Loss, ScanErrors, limit_beside, measure_shifts, measure_site_error
+from damageest.trust.interval.uncertainty import limit_beside, measure_site_error
 from damageest.trust.scan_quality import describe_few
 from damageest.trust.skin.coverage import find_removed_cells
+from damageest.trust.terms.noise import Noise
+from damageest.trust.terms.spacing import Spacing
 from damageest.trust.views.view_overlap import compare_at_site
 
 COARSE = 0.05
@@ -63,6 +68,7 @@ BESIDE = 2.0
         "pose",
         "pose_error",
         "scanner_errors",
+        "terms",
         "tolerance",
         "unit",
         "adapter",
@@ -81,7 +87,7 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
 @step(
     gives=("volume_95", "budget"),
     reads=(
-        "found", "failures", "pose", "field", "adapted", "folded", "views", "sensor", "scanner_errors", "unit",
+        "found", "failures", "pose", "field", "adapted", "folded", "views", "sensor", "unit",
     ),
 )  # fmt: skip
 def sum_uncertainty(state: JobState) -> tuple[Interval | None, Budget | None]:
@@ -125,11 +131,7 @@ def _sum_budget(state: JobState, hidden: float) -> Budget | None:
     errors = [site.error for site in state.found if site.accepted and site.error is not None]
     if not errors:
         return None
-    field = state.field
-    return make_volume_budget(
-        errors, state.scanner_errors, field.aligned.noise, field.part.tessellation_error, state.unit,
-        doubtful=hidden + _sum_doubtful(state.found), free=sum_free(errors),
-    )  # fmt: skip
+    return make_volume_budget(errors, state.unit, hidden + _sum_doubtful(state.found), sum_free(errors))
 
 
 def _sum_doubtful(found: tuple[FoundSite, ...]) -> float:
@@ -147,7 +149,7 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     """The site with its uncertainty and its errors; the latter are None where there is no interval."""
     if site.method == BY_RAYS_ALONE:  # a whole body of the part: its volume is known
         known = site.damage.volume
-        error = SiteError(known, 0.0, 0.0, 0.0, 0.0)
+        error = SiteError(known)
         return replace(site, uncertainty=Uncertainty((known, known), None), error=error)
     if site.method == PORE:
         return _measure_pore(state, site)
@@ -157,13 +159,11 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     site = replace(site, beyond=beyond)
     differ = WIDTH * compare_at_site(state.field, site.members, state.skin.cells.edge)
     facts = replace(state.facts, between_views=max(state.facts.between_views, differ))
+    loss = Loss(site.damage, inner, points, site.evidence, beyond)
+    errors = ScanErrors(pose, facts, state.scanner_errors)
     # what the model fit gives is the 95 % bound of a deviation
-    loss, errors = (
-        Loss(site.damage, inner, points, site.evidence, beyond),
-        ScanErrors(pose, facts, state.scanner_errors),
-    )
-    form = _measure_form(state, site)
-    found = measure_site_error(loss, state.field, errors, form, state.pose.free, state.adapted)
+    case = LossCase(loss, state.field, errors, _measure_form(state, site), state.adapted)
+    found = measure_site_error(case, state.terms, state.pose.free)
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
     reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
@@ -179,34 +179,14 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         rates=np.append(found.rates, [one.rate for one in dependences]),
         motions=np.concatenate([found.motions, *([[one.motion.low, one.motion.high]] for one in dependences)]),
     )
-    volume, depth = combine_site(error)
-    uncertainty = Uncertainty(
-        volume_95=volume,
-        depth_95=depth,
-        noise=error.noise,
-        spacing=error.spacing,
-        rim=error.rim,
-        pose=float(np.linalg.norm(error.pose)),
-        tessellation=error.tessellation,
-        form=error.form,
-        outward=error.outward,
-        views=error.views,
-        adapt=float(np.linalg.norm(error.adapt)),
+    uncertainty = replace(
+        _describe(error, state.unit),
         extrapolated=extrapolated,
         extrapolated_error=extrapolated_error,
-        free=error.free,
-        inside=error.inside,
         beside=error.beside,
         fading=fading,
-        probing_form=error.probing_form,
-        scanner=float(np.linalg.norm(error.scanner)),
-        budget=make_volume_budget(
-            [error], state.scanner_errors, state.aligned.noise, state.part.tessellation_error, state.unit,
-            free=error.free,
-        ),
-        depth_budget=make_depth_budget(error, state.scanner_errors, state.unit),
         certain=measure_certain(error),
-    )  # fmt: skip
+    )
     return replace(site, uncertainty=uncertainty, error=error, dependences=dependences, bent_wall=bent_wall)
 
 
@@ -218,18 +198,30 @@ def _measure_pore(state: JobState, site: FoundSite) -> FoundSite:
     if surface is None:
         return replace(site, uncertainty=Uncertainty(None, None))
     deepest = float(-state.field.distance[site.members].min())
-    error = SiteError(
-        site.damage.volume, surface.noise, ROUGH * surface.gap * site.damage.area, 0.0, 0.0,
-        depth=deepest, depth_error=float(np.hypot(surface.gap / 2, noise)), depth_by={"spacing": surface.gap / 2},
-    )  # fmt: skip
+    shares = (
+        (Noise(), Share(surface.noise, noise, noise)),
+        (Spacing(), Share(ROUGH * surface.gap * site.damage.area, surface.gap / 2)),
+    )
+    error = SiteError(site.damage.volume, shares, depth=deepest)
+    return replace(site, uncertainty=_describe(error, state.unit), error=error)
+
+
+def _describe(error: SiteError, unit: str) -> Uncertainty:
+    """What the errors of a site say of its volume and depth: intervals, terms and budgets."""
     volume, depth = combine_site(error)
-    unit = state.unit
-    uncertainty = Uncertainty(
-        volume, depth, noise=error.noise, spacing=error.spacing,
-        budget=make_volume_budget([error], state.scanner_errors, noise, state.part.tessellation_error, unit),
-        depth_budget=make_depth_budget(error, state.scanner_errors, unit),
-    )  # fmt: skip
-    return replace(site, uncertainty=uncertainty, error=error)
+    by_term = error.measure_terms()
+    known = {one.name for one in fields(Uncertainty)}
+    scanner = [size for name, size in by_term.items() if name in TERMS]
+    return Uncertainty(
+        volume,
+        depth,
+        free=error.free,
+        inside=error.inside,
+        scanner=float(np.linalg.norm(scanner)) if scanner else 0.0,
+        budget=make_volume_budget([error], unit, free=error.free),
+        depth_budget=make_depth_budget(error, unit),
+        **{name: size for name, size in by_term.items() if name in known},  # type: ignore[arg-type]
+    )
 
 
 def _measure_form(state: JobState, site: FoundSite) -> float:

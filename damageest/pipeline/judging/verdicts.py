@@ -75,7 +75,7 @@ def gather_facts(state: JobState) -> ScanFacts:
     return replace(facts, fit=fit, adapted=0.0 if adapted is None else adapted.amount)
 
 
-@step(gives="found", reads=("found", "accept", "rules", "facts", *JUDGED_BY))
+@step(gives="found", reads=("found", "accept", "rules", "terms", "facts", *JUDGED_BY))
 def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site its verdict, and takes as damage those that the job accepts."""
     accept = state.accept
@@ -148,6 +148,7 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         beyond=site.beyond.amount,
         beyond_words=site.beyond.reason,
         other_volume=site.other_volume,
+        terms=state.terms,
     )
     case = SiteCase(site.damage, members, field, state.facts, state.skin, state.coverage, state.pose, state.views, held)
     return measure_facts(state.rules, case, facts)

@@ -14,7 +14,7 @@ from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.rules import ScanFacts
 from damageest.trust.interval.pose_error import PoseError
-from damageest.trust.interval.scanner import FORM_RANGE, REFERENCE, ScannerErrors, Term, leave_form, spread_of
+from damageest.trust.interval.scanner import FORM_RANGE, REFERENCE, Figure, ScannerErrors, leave_form, spread_of
 from damageest.trust.interval.site_error import WIDTH
 from damageest.trust.model_fit import FittedModel
 
@@ -49,9 +49,9 @@ def weigh_scanner(
         unknown.append("probing_size")
     else:
         size, shape = spread_of(certificate.probing_size, certificate.k)
-        terms.append(Term("probing_size", size, unit, 0.5, shape))
+        terms.append(Figure("probing_size", size, unit, 0.5, shape))
     if corrected_scale != 1 and fitted is not None:
-        terms.append(Term("fitted_scale", fitted.fit.scale_error, "", 1.0, "normal"))
+        terms.append(Figure("fitted_scale", fitted.fit.scale_error, "", 1.0, "normal"))
     else:
         scales, missing = _list_scales(certificate, temperature, part.diagonal)
         terms += scales
@@ -69,15 +69,15 @@ def weigh_scanner(
 
 def _list_scales(
     certificate: Certificate, temperature: Temperature | None, diagonal: float
-) -> tuple[list[Term], list[str]]:
+) -> tuple[list[Figure], list[str]]:
     """The errors of the scale, and what is not known of them."""
-    terms: list[Term] = []
+    terms: list[Figure] = []
     unknown: list[str] = []
     if certificate.length_error is None:
         unknown.append("length")
     else:
         most, shape = spread_of(certificate.length_error.at(diagonal), certificate.k)
-        terms.append(Term("length", most / diagonal, "", 1.0, shape))
+        terms.append(Figure("length", most / diagonal, "", 1.0, shape))
     if temperature is None:
         return terms, [*unknown, "temperature"]
     figures = (
@@ -89,7 +89,7 @@ def _list_scales(
             unknown.append(f"{name}_uncertainty")
         else:
             spread, shape = spread_of(value, temperature.k)
-            terms.append(Term(name, spread, unit, rate, shape))
+            terms.append(Figure(name, spread, unit, rate, shape))
     return terms, unknown
 
 

@@ -6,19 +6,10 @@ beside this one.
 
 from __future__ import annotations
 
-from importlib import import_module
-from pkgutil import iter_modules
-
 from damageest.trust.doubt import Rule
+from damageest.trust.table import find_classes
 
 
 def list_rules() -> list[type[Rule]]:
     """Every rule of damageest, in the order in which reasons of equal effect are listed."""
-    modules = [import_module(f"{__name__}.{found.name}") for found in iter_modules(__path__)]
-    found = [
-        one
-        for module in modules
-        for one in vars(module).values()
-        if isinstance(one, type) and issubclass(one, Rule) and one.__module__ == module.__name__
-    ]
-    return sorted(found, key=lambda rule: rule.rank)
+    return sorted(find_classes(__name__, __path__, Rule), key=lambda rule: rule.rank)  # type: ignore[type-abstract]

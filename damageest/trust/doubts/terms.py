@@ -6,29 +6,13 @@ from collections.abc import Iterable
 
 from damageest.artefacts import Reason
 from damageest.trust.doubt import Rule, ScanFacts, SiteFacts
+from damageest.trust.interval.site_error import Term
+from damageest.trust.terms import list_terms
 
 TOLD = 0.05
 """Half-width of the interval, as a share of the volume, from which its causes are told."""
 LARGE = 1 / 3
 """Half-width that a cause gives by itself, as a share of the largest one, from which it is named."""
-CAUSES = {
-    "form": ("deviating intact skin", "check whether the part is bent, or the scan scaled"),
-    "outward": ("skin as far outside the part", "check pose and scale of the scan"),
-    "views": ("disagreeing views", "register the views again"),
-    "adapt": (
-        "adaptation of the part",
-        "scan more intact skin beside it, or give a datum or a second part of its type",
-    ),
-    "pose": ("pose", "scan more intact skin, or name unworn faces in align.datum"),
-    "rim": ("rim", "a smaller tolerance, if the noise allows it"),
-    "spacing": ("gaps between the points", "scan this place more densely"),
-    "noise": ("noise", "scan with less noise, or several times"),
-    "tessellation": (
-        "triangles of part or earlier scan",
-        "a finer part.chord, or a denser earlier scan",
-    ),
-}
-"""Each cause in words, and what makes it smaller."""
 
 
 class Terms(Rule):
@@ -44,17 +28,17 @@ class Terms(Rule):
             return
         if site.interval[1] - site.interval[0] <= 2 * TOLD * site.volume:
             return
-        halves = {name: 2 * float(getattr(site.uncertainty, name)) for name in CAUSES}
+        terms = {one.name: one for one in site.terms or [term() for term in list_terms()] if one.words}
+        halves = {name: 2 * site.uncertainty.measure(name) for name in terms}
         most = max(halves.values())
         told = sorted((name for name in halves if halves[name] > LARGE * most), key=lambda name: -halves[name])
         if not told:  # what makes it wide is told by other rules: free motions, what is not seen
             return
-        words = [f"±{halves[name]:.3g} {scan.unit}³ ({self._name(name, scan)})" for name in told]
+        words = [f"±{halves[name]:.3g} {scan.unit}³ ({self._name(terms[name], scan)})" for name in told]
         text = f"its volume is uncertain by {', '.join(words)}"
-        yield Reason(self.code, text, "widens", halves[told[0]], f"{scan.unit}³", remedy=CAUSES[told[0]][1])
+        yield Reason(self.code, text, "widens", halves[told[0]], f"{scan.unit}³", remedy=terms[told[0]].remedy)
 
-    def _name(self, cause: str, scan: ScanFacts) -> str:
-        words = CAUSES[cause][0]
-        if cause == "form" and scan.fit is not None and scan.fit.model != "ok":
-            return f"{words}: {scan.fit.name}"
-        return words
+    def _name(self, term: Term, scan: ScanFacts) -> str:
+        if term.name == "form" and scan.fit is not None and scan.fit.model != "ok":
+            return f"{term.words}: {scan.fit.name}"
+        return term.words

@@ -30,7 +30,7 @@ fitted to the part, in place of the others."""
 
 
 @dataclass(frozen=True)
-class Term:
+class Figure:
     """One systematic error of the scan. ``uncertainty``: standard uncertainty of the figure, in ``unit``; ``rate``: the
     offset (in the job's unit) or the scale (as a share) for each unit of it."""
 
@@ -52,7 +52,7 @@ class ScannerErrors:
     what the scan itself shows. ``unknown``: what the job does not tell. ``certificate``: scanner and standard in
     words."""
 
-    terms: tuple[Term, ...] = ()
+    terms: tuple[Figure, ...] = ()
     form: float = 0.0
     unknown: tuple[str, ...] = ()
     certificate: str = ""
@@ -71,17 +71,18 @@ class ScannerErrors:
         return float(np.sqrt(sum(one.effect**2 for one in self.terms if TERMS[one.name] == kind)))
 
 
-class Shares(NamedTuple):
-    """By how much a volume and its largest depth change with each of the terms (T,), for one standard uncertainty."""
+class FigureShare(NamedTuple):
+    """By how much a volume and its largest depth change with a ``figure``, for one standard uncertainty."""
 
-    volume: Floats
-    depth: Floats
+    figure: Figure
+    volume: float
+    depth: float
 
 
 def find_shares(
     errors: ScannerErrors, damage: Solid, inner: Flags, deepest: tuple[Floats, Floats], pose: PoseError, follows: bool
-) -> Shares:
-    """What the terms make of a site.
+) -> dict[str, FigureShare]:
+    """What the terms make of a site, by their names.
 
     Args:
         inner: (F,) which faces of ``damage`` are on its inner surface.
@@ -106,11 +107,11 @@ def find_shares(
         volume = {kind: direct[kind] - pose.of_motion(motion, *skin) for kind, motion in undone.items()}
         moved = {"offset": -1.0, "scale": -float(place @ outward)}
         depth = {kind: moved[kind] + pose.move_distance(motion, deepest[0], outward) for kind, motion in undone.items()}
-    kinds = [(TERMS[one.name], one.uncertainty * one.rate) for one in errors.terms]
-    return Shares(
-        np.array([volume[kind] * size for kind, size in kinds]),
-        np.array([depth[kind] * size for kind, size in kinds]),
-    )
+    found = {}
+    for one in errors.terms:
+        kind, size = TERMS[one.name], one.uncertainty * one.rate
+        found[one.name] = FigureShare(one, volume[kind] * size, depth[kind] * size)
+    return found
 
 
 def spread_of(value: float, k: float | None) -> tuple[float, Distribution]:

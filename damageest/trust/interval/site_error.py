@@ -8,13 +8,17 @@ What unseen surface may hide, what fades out, and what a field took for form mak
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from abc import ABC, abstractmethod
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar, Literal
 
 import numpy as np
 
 from damageest.artefacts import Floats
 from damageest.findings import Interval
+from damageest.trust.interval.loss import LossCase
+from damageest.trust.interval.scanner import Distribution, Figure
 
 WIDTH = 2.0
 """Half the width of a 95 % interval in standard deviations."""
@@ -24,38 +28,74 @@ MARGIN = 1.25
 the low end of its interval is a fifth of it."""
 
 
+class Term(ABC):
+    """One source of uncertainty, a term of the interval and a row of the budget.
+
+    ``name``: of the source, the same from version to version; ``text``: the source in words; ``type``: A, from this
+    scan by statistics, or B, from other knowledge (JCGM 100); ``rank``: its place in the budget, the lowest first.
+    ``words`` and ``remedy``: how the reason `wide_interval` names it, and what makes it smaller; empty: it does not.
+    ``is_own``: different in each site, and not common to all. ``is_of_surface``: an error of the inner surface itself,
+    and not of the skin above it. ``is_of_points``: the depth of each scan point has it as well.
+    """
+
+    name: ClassVar[str]
+    text: ClassVar[str]
+    type: ClassVar[Literal["A", "B"]]
+    distribution: ClassVar[Distribution] = "normal"
+    words: ClassVar[str] = ""
+    remedy: ClassVar[str] = ""
+    rank: ClassVar[int] = 1000
+    is_own: ClassVar[bool] = False
+    is_of_surface: ClassVar[bool] = False
+    is_of_points: ClassVar[bool] = True
+    owner: str = ""
+    """The plugin that it is from, which the registry sets; empty for those of damageest."""
+
+    @abstractmethod
+    def measure(self, case: LossCase) -> Share | None:
+        """What the source makes of a loss; None where it is not known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Share:
+    """What a source makes of a site, each as one standard deviation.
+
+    ``volume``: change of the volume, signed where sites may differ in sign; (J,) for a source of J independent errors.
+    ``depth``: of the largest depth. ``source``: standard uncertainty of the source in the job's unit, 0: what moves the
+    inner surface by as much. ``figure``: of the certificate, where it is the source.
+    """
+
+    volume: float | Floats = 0.0
+    depth: float = 0.0
+    source: float = 0.0
+    figure: Figure | None = None
+
+    @property
+    def columns(self) -> Floats:
+        """(J,) the changes of the volume."""
+        return np.atleast_1d(np.asarray(self.volume, float))
+
+
 @dataclass(frozen=True, eq=False)
 class SiteError:
     """The errors of one site's volume, each as one standard deviation, and of its largest depth.
 
-    ``pose`` (K,): signed, by the columns of `PoseError.spread`; ``excess``: by how much the volume is too large on
-    average; ``adapt`` (J,): signed, by the modes of an adapted part; ``rates`` (M,): change of the volume for each unit
-    of each free motion, by the other field of an adapted part, and where its growth is the scan's; ``motions`` (M,2):
-    their ends;
+    ``shares``: of the terms, in the order of the budget. ``excess``: by how much the volume is too large on average;
+    ``rates`` (M,): change of the volume for each unit of each free motion, by the other field of an adapted part, and
+    where its growth is the scan's; ``motions`` (M,2): their ends;
     ``inside`` (where points do not bound it), ``beside``, ``fading``, ``taken`` (what the field of an adapted part made
     thinner there, and wear may have): by how much the loss may be larger; ``less``: by
     how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
-    volume, corrected for its mean error; ``depth_error``: one standard deviation; ``depth_free``: change by the free
-    motions. ``corner``: how far a corner of the inner surface goes beyond the volume and its scan points. ``measured``:
-    the largest depth of a scan point, with what its noise, the pose and the skin may be off, and the corner.
-    ``probing_form``, ``scanner`` (T,): by the certificate and the temperature, signed, by the terms of `ScannerErrors`;
-    ``depth_scanner`` (T,): the same of the depth, and ``depth_by``: the other causes of ``depth_error``, by name.
-    ``exposed``: the area that is moved against the skin by what deviates; ``curved``: that of skin made of chords.
-    ``depths`` (Q,): quantiles of how deep the loss is over that area: where it is shallow, no more than that is in
-    doubt.
+    volume, corrected for its mean error; ``depth_free``: change by the free motions. ``corner``: how far a corner of
+    the inner surface goes beyond the volume and its scan points. ``measured``: the largest depth of a scan point, with
+    what its noise, the pose and the skin may be off, and the corner. ``exposed``: the area that is moved against the
+    skin by what deviates. ``depths`` (Q,): quantiles of how deep the loss is over that area: where it is shallow, no
+    more than that is in doubt.
     """
 
     volume: float
-    noise: float
-    spacing: float
-    rim: float
-    excess: float
-    pose: Floats = field(default_factory=lambda: np.empty(0))
-    tessellation: float = 0.0
-    form: float = 0.0
-    outward: float = 0.0
-    views: float = 0.0
-    adapt: Floats = field(default_factory=lambda: np.empty(0))
+    shares: tuple[tuple[Term, Share], ...] = ()
+    excess: float = 0.0
     rates: Floats = field(default_factory=lambda: np.empty(0))
     motions: Floats = field(default_factory=lambda: np.empty((0, 2)))
     inside: float = 0.0
@@ -64,17 +104,20 @@ class SiteError:
     fading: float = 0.0
     taken: float = 0.0
     depth: float = 0.0
-    depth_error: float = 0.0
     corner: float = 0.0
     measured: float = np.inf
     depth_free: float = 0.0
-    probing_form: float = 0.0
-    scanner: Floats = field(default_factory=lambda: np.empty(0))
-    depth_scanner: Floats = field(default_factory=lambda: np.empty(0))
-    depth_by: Mapping[str, float] = field(default_factory=dict)
     exposed: float = 0.0
-    curved: float = 0.0
     depths: Floats = field(default_factory=lambda: np.empty(0))
+
+    @property
+    def depth_error(self) -> float:
+        """Standard deviation of the largest depth."""
+        return float(np.sqrt(sum(share.depth**2 for _, share in self.shares)))
+
+    def measure_terms(self) -> dict[str, float]:
+        """The standard deviation of the volume by each term."""
+        return {term.name: float(np.linalg.norm(share.columns)) for term, share in self.shares}
 
     @property
     def free(self) -> Interval:
@@ -101,23 +144,39 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
     """
     if not errors:
         return volume, volume + doubtful
-    alone = np.array([[one.noise, one.probing_form] for one in errors])
-    shared = np.sum(
-        [[one.spacing, one.rim, one.form, one.tessellation, one.outward, one.views] for one in errors], axis=0
-    )
-    told = np.sum([one.scanner for one in errors if len(one.scanner)], axis=0)
-    moved = np.sum([one.pose for one in errors if len(one.pose)], axis=0)
-    bent = np.sum([one.adapt for one in errors if len(one.adapt)], axis=0)
-    squares = [(one**2).sum() for one in (alone, shared, moved, bent, told)]
-    deviation = float(np.sqrt(sum(squares)))
+    variances = [(term, sum_variance(term, each)) for term, each in gather_shares(errors)]
+    deviation = float(np.sqrt(sum(variance for _, variance in variances)))
     more = sum(one.inside + one.beside + one.fading + one.taken for one in errors)
     free = sum_free(errors)
     middle = volume - sum(one.excess for one in errors)
-    own = WIDTH * float(np.sqrt((alone**2).sum() + (shared[:2] ** 2).sum())) + max(volume - middle, 0.0)
+    of_surface = sum(variance for term, variance in variances if term.is_of_surface)
+    own = WIDTH * float(np.sqrt(of_surface)) + max(volume - middle, 0.0)
     taken = margin * (volume - min(middle - WIDTH * deviation, volume) - free[0])
     low = volume - _limit_taken(errors, taken, min(margin * own, taken)) - sum(one.less for one in errors)
     high = max(middle + WIDTH * deviation, volume) + free[1] + more
     return max(low, 0.0), high + doubtful
+
+
+def gather_shares(errors: Sequence[SiteError]) -> list[tuple[Term, list[Share]]]:
+    """The shares of the sites by term, in the order of the budget."""
+    found: dict[str, tuple[Term, list[Share]]] = {}
+    for term, share in sorted((pair for one in errors for pair in one.shares), key=lambda pair: pair[0].rank):
+        found.setdefault(term.name, (term, []))[1].append(share)
+    return list(found.values())
+
+
+def sum_columns(term: Term, shares: Iterable[Share]) -> Floats:
+    """(J,) the independent errors that a term has in some sites together: its own ones in each stay apart, common ones
+    add with their sign."""
+    each = [share.columns for share in shares if share.columns.size]
+    if not each:
+        return np.empty(0)
+    return np.concatenate(each) if term.is_own else np.asarray(np.sum(each, axis=0))
+
+
+def sum_variance(term: Term, shares: Iterable[Share]) -> float:
+    """The variance of the volume of some sites together by a term."""
+    return float((sum_columns(term, shares) ** 2).sum())
 
 
 def measure_certain(error: SiteError) -> float:

@@ -13,9 +13,10 @@ from damageest.stages.adapt._body import spread_evenly
 from damageest.stages.adapt._choose import Score, Trial
 from damageest.stages.adapt._field import Field, Freedom
 from damageest.stages.adapt._other import find_other, find_thinned
-from damageest.trust.interval.site_error import SiteError, combine_total
+from damageest.trust.interval.site_error import combine_total
 from tests import damaged_box
 from tests.stages.adapt.test_smooth import TOLERANCE, adapt
+from tests.trust.errors import make_error
 
 BASIS = Basis(np.zeros(3), 20.0, np.ones(3))
 
@@ -67,11 +68,11 @@ def test_wear_that_a_thinner_part_would_look_like_is_told() -> None:
 
 
 def test_both_volumes_are_in_the_interval() -> None:
-    site = SiteError(100.0, 1.0, 1.0, 1.0, 0.0, rates=np.array([-60.0]), motions=np.array([[0.0, 1.0]]))
+    site = make_error(100.0, noise=1.0, spacing=1.0, rim=1.0, rates=np.array([-60.0]), motions=np.array([[0.0, 1.0]]))
     low, high = combine_total(100.0, [site])
     assert low < 40 < high
     assert high < 110
-    whole = SiteError(50.0, 0.0, 0.0, 0.0, 0.0)  # a body that is lost has no rates
+    whole = make_error(50.0)  # a body that is lost has no rates
     assert combine_total(150.0, [whole, site]) == pytest.approx((low + 50, high + 50))
 
 

@@ -13,6 +13,7 @@ from damageest.job import load
 from damageest.registry import Registry
 from damageest.stages.report._words import FOLDER, Words, list_languages
 from damageest.trust.interval import budget
+from damageest.trust.terms import list_terms
 from tests import damaged_box
 from tests.needs import import_or_skip
 
@@ -67,7 +68,7 @@ def test_the_pdf_in_german_and_in_english_again(small_done: Path) -> None:
 
 def test_every_text_of_page_and_pdf_is_in_each_catalogue() -> None:
     pofile = import_or_skip("babel.messages.pofile")
-    texts = {*(source.text for source in budget.SOURCES.values()), *budget.UNKNOWN.values(), "normal", "rectangular"}
+    texts = {*(term.text for term in list_terms()), *budget.UNKNOWN.values(), "normal", "rectangular"}
     texts |= set(re.findall(r'BudgetBound\("\w+", "([^"]*)"', Path(budget.__file__).read_text()))
     for path in REPORT.rglob("*.py"):
         source = path.read_text()
