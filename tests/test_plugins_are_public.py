@@ -141,7 +141,7 @@ def test_a_plugin_uses_public_names_only() -> None:
         "from damageest.job.check import load",
         "from damageest.batches.run import batch",
         "from damageest import api",
-        "from damageest.trust.doubts.terms import Terms",
+        "from damageest.trust.doubts.wide_interval import WideInterval",
         "def f():\n    import damageest.pipeline",
     ],
 )

@@ -15,7 +15,7 @@ LARGE = 1 / 3
 """Half-width that a cause gives by itself, as a share of the largest one, from which it is named."""
 
 
-class Terms(Rule):
+class WideInterval(Rule):
     code = "wide_interval"
     meaning = "quantifiable errors make the interval wide; result.json has each under uncertainty"
     threshold = f"a half-width of {TOLD:.0%} of the volume; causes of a third of the largest one are named"
