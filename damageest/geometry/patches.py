@@ -40,6 +40,12 @@ class Patches:
         """The patches with points of another ``label`` (N,), 0 or more, apart: those of the views that show a patch."""
         return Patches.of_equal(self.group * (int(label.max(initial=0)) + 1) + label)
 
+    def tabulate(self, label: Ints, count: int, values: Floats | None = None) -> Floats:
+        """(G,L) the number of points of each ``label`` (N,), of ``count`` L, in each patch, or the sum of their
+        ``values`` (N,): what each of some views shows of each patch."""
+        size = len(self.count) * count
+        return np.bincount(self.group * count + label, values, size).reshape(-1, count).astype(np.float64)
+
     def mean(self, values: Floats) -> Floats:
         """(G,) or (G,K) mean over the points of each patch, of values (N,) or (N,K)."""
         if values.ndim == 1:

@@ -15,7 +15,7 @@ from damageest.errors import DamageestError
 from damageest.io.meshes import write_points, write_stl
 from damageest.output.result_json import build_report
 from damageest.stages.scan.deformation import Deformation, deform
-from tests.checks.form_scenes import TOLERANCE, add_noise, draw_skin, get_part
+from tests.trust.form_scenes import TOLERANCE, add_noise, draw_skin, get_part
 
 SETTINGS = ["align=none", "adapt=none", "allowance=none", f"tolerance={TOLERANCE}"]
 

@@ -7,8 +7,8 @@ import pytest
 
 from damageest.geometry.transforms import remove_rigid
 from damageest.trust.form.form_fields import BENDS, EVERY, SCALE, STRETCHES, TWISTS, choose_frame
-from tests.checks.form_scenes import draw_skin, get_part
 from tests.geometry.shapes import draw_pose
+from tests.trust.form_scenes import draw_skin, get_part
 
 POINTS = draw_skin(count=2000)[0]
 FRAME = choose_frame(get_part(), POINTS)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from damageest.stages.scan.deformation import Deformation, deform
-from tests.checks.form_scenes import TOLERANCE, add_noise, draw_skin, fit, get_part
+from tests.trust.form_scenes import TOLERANCE, add_noise, draw_skin, fit, get_part
 
 
 def test_a_part_as_designed_is_ok() -> None:

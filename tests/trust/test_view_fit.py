@@ -12,7 +12,7 @@ from damageest.artefacts import Scan
 from damageest.geometry.noise import measure_noise_and_spacing
 from damageest.stages.scan.simulate import Simulate
 from damageest.trust.views.view_fit import fit_views
-from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
+from tests.trust.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
 
 SCANNERS = 200.0 * np.array([(1, 1, 1), (-1, -1, 1), (1, -1, -1), (-1, 1, -1), (-1, 1, 1), (1, 1, -1)])
 

@@ -15,7 +15,7 @@ from damageest.geometry.distance import distance_to_mesh
 from damageest.stages.scan.simulate import Simulate
 from damageest.trust.views.view_fit import fit_views
 from damageest.trust.views.view_split import separate_views
-from tests.checks.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
+from tests.trust.form_scenes import NOISE, TOLERANCE, add_noise, draw_skin, get_part
 
 SCANNERS = np.array([(1.0, 0.3, 1.0), (-0.8, 0.5, 1.0), (0.1, -1.0, 0.9)])
 

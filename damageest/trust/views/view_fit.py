@@ -234,11 +234,10 @@ def _compare(skin: Skin, points: Floats, view: Ints, count: int, gap: float, tol
     distance, places, normals = skin.find_feet(points)
     offset = np.einsum("ij,ij->i", normals, points - places)
     used = (distance < REACH * tolerance) & (np.abs(np.abs(offset) - distance) < 0.1 * tolerance)
-    cell = Patches.on_skin(places[used], normals[used], 5 * gap).group
-    cells = int(cell.max(initial=-1)) + 1
-    total = np.bincount(cell * count + view[used], minlength=cells * count).reshape(-1, count).astype(np.float64)
-    sums = np.bincount(cell * count + view[used], offset[used], cells * count).reshape(-1, count)
-    squares = np.bincount(cell * count + view[used], offset[used] ** 2, cells * count).reshape(-1, count)
+    cells = Patches.on_skin(places[used], normals[used], 5 * gap)
+    total, sums, squares = (
+        cells.tabulate(view[used], count, values) for values in (None, offset[used], offset[used] ** 2)
+    )
     mean = sums / np.maximum(total, 1)
     scatter = np.sqrt(np.maximum(squares / np.maximum(total, 1) - mean**2, 0))
     mean[(total < FEWEST_OF_VIEW) | (scatter > even)] = np.nan

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Part, Scan
-from damageest.geometry.duplicates import group_integers
 from damageest.geometry.patches import Patches
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.voxels import number_cubes
@@ -47,7 +46,7 @@ KEPT = 0.6
 """Share of that which it has to explain on patches that it was not fitted to."""
 WIDTHS = (5.0, 2.0, 0.7)
 """Widths of the kernel, in tolerances, before the last."""
-OF_SCAN = 0.02
+DOUBLE = 0.02
 """Share of the points at which the scan shows two surfaces, from which these may be two views."""
 ALIKE = 0.2
 """What is left of the distance of both surfaces after one motion, in half of the places: share of it, at most."""
@@ -175,16 +174,14 @@ def _find_cut(points: _Points, low: int, high: int, width: float, tolerance: flo
     if high - low < LEAST_POINTS:
         return None
     block = np.arange(high - low) * BLOCKS // (high - low)
-    cell = group_integers(points.cell[low:high])[1]
-    cells = int(cell.max()) + 1
+    cells = Patches.of_equal(points.cell[low:high])
+    cell = cells.group
     columns = np.concatenate(
         [np.ones((high - low, 1)), points.offset[low:high, None], points.jacobian[low:high]], axis=1
     )
-    sums = np.stack(
-        [np.bincount(cell * BLOCKS + block, column, cells * BLOCKS).reshape(cells, BLOCKS) for column in columns.T]
-    )
+    sums = np.stack([cells.tabulate(block, BLOCKS, column) for column in columns.T])
     before = sums.cumsum(axis=2)
-    patch = np.zeros(cells, np.int64)
+    patch = np.zeros(len(cells.count), np.int64)
     patch[cell] = points.patch[low:high]
     gains: list[tuple[float, int]] = []
     for k in range(1, BLOCKS):
@@ -246,7 +243,7 @@ def _separate_by_sheets(
 ) -> Ints | None:
     """The view (N,) of each point, 0 for the upper surface and 1 for the lower, -1 for points on neither."""
     sheets = find_sheets(ScanField.measure(part, aligned.take(points.index), tolerance))
-    if sheets.sheets.share < OF_SCAN:
+    if sheets.sheets.share < DOUBLE:
         return None
     double = sheets.places
     one = np.ones(len(double))
