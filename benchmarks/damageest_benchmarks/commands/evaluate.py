@@ -36,6 +36,7 @@ from damageest_benchmarks.commands import (
     prepare,
     real,
     realistic,
+    reported,
     sections,
     speed,
     steady,
@@ -57,6 +58,7 @@ app.command("named")(named.command)
 app.command("others")(others.command)
 app.command("real")(real.command)
 app.command("realistic")(realistic.command)
+app.command("reported")(reported.command)
 app.command("steady")(steady.command)
 app.command("sections")(sections.command)
 app.command("speed")(speed.command)

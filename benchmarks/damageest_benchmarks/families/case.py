@@ -57,13 +57,17 @@ class FamilyCase:
 
 
 def run_case(case: FamilyCase) -> Row:
-    """Runs a draw. It comes out where the outcome is right, or the volume is inside its interval, and the interval of
-    its accepted sites holds the truth and ends within a quarter of what was found. The interval of the total also
-    holds what may be lost where nothing was seen, and is not counted here."""
+    """Runs a draw."""
+    return run_draw(FAMILIES[case.family][1](case.seed), case.make_blank_row())
+
+
+def run_draw(draw: Draw, row: Row) -> Row:
+    """The row with what a run makes of a draw. It comes out where the outcome is right, or the volume is inside its
+    interval, and the interval of its accepted sites holds the truth and ends within a quarter of what was found. The
+    interval of the total also holds what may be lost where nothing was seen, and is not counted here."""
     import damageest
 
-    draw = FAMILIES[case.family][1](case.seed)
-    row = case.make_blank_row() | {"said": dict(draw.said), "shown": draw.shown}
+    row = row | {"said": dict(draw.said), "shown": draw.shown}
     row["true_volume"] = draw.damage.volume if draw.damage else 0.0
     job = {"version": 1, "units": "mm", "tolerance": float(f"{draw.tolerance:.6g}"), "allowance": "none"}
     start = time.perf_counter()
