@@ -75,6 +75,7 @@ def make_scan(
         scan = scan.take(near)
     if not len(scan.points):
         raise InputError(f"{name}: has no points" + (f" with valid coordinates; {notes[-1]}" if len(points) else ""))
+    notes = (*notes, *_describe_lost_coordinate(scan.points))
     keep, _ = find_duplicates(scan.points)
     if len(keep) < len(scan.points):
         notes = (*notes, f"removed {len(scan.points) - len(keep)} duplicate points")
@@ -91,6 +92,16 @@ def make_scan(
             which = "all" if wrong == len(normals) else f"{wrong:,} of {len(normals):,}"
             notes, normals = (*notes, f"{which} normals are zero or not finite; no normals are used"), None
     return replace(scan, normals=normals, notes=notes)
+
+
+def _describe_lost_coordinate(points: Floats) -> tuple[str, ...]:
+    """A note where a coordinate is the same at all points, as where the numbers of a file overflowed."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    same = np.flatnonzero((low == high) & (high - low < np.max(high - low)))
+    return tuple(
+        f"{'xyz'[k]} is {low[k]:.10g} at all {len(points):,} points: the file has lost this coordinate, or a plane was "
+        "drawn and not scanned" for k in same
+    )  # fmt: skip
 
 
 def average_stacks(scan: Scan) -> tuple[Scan, tuple[str, ...]]:

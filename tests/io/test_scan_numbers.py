@@ -30,3 +30,12 @@ def test_steps_of_single_precision_are_named(shift: float, kind: str, step: floa
     told = [one for one in scan.warnings if one.code == "coarse_numbers"]
     assert [one.amount for one in told] == ([step] if step else [])
     assert all("200 steps across" in one.text for one in told)
+
+
+def test_a_coordinate_that_is_the_same_at_all_points_is_told() -> None:
+    points = np.random.default_rng(4).uniform(size=(500, 3))
+    assert not make_scan(points).notes
+    points[:, 1] = -2147483.648
+    (note,) = make_scan(points).notes
+    assert note.startswith("y is -2147483.648 at all 500 points: the file has lost this coordinate")
+    assert not make_scan(points[:1]).notes

@@ -13,7 +13,7 @@ import numpy as np
 from damageest.artefacts import Floats, Mesh, Part, Scan, Solid
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
-from damageest.io.meshes import write_ply
+from damageest.io.meshes import write_ply, write_points
 from damageest.io.scans import read_scan
 from damageest_benchmarks.families.scene import Draw, draw_motion, move_out
 from damageest_benchmarks.troubles.parts import make_named_part
@@ -80,6 +80,14 @@ class Bench:
             path = Path(folder) / "scan.ply"
             write_ply(path, Mesh(draw.scan.points, mesh.faces))
             return replace(draw, scan=read_scan([path], "mm"))
+
+
+def read_again(draw: Draw, columns: dict[str, Floats] | None = None) -> Draw:
+    """The draw with its scan as a file of the points, and of more columns (N,), is read."""
+    with tempfile.TemporaryDirectory(prefix="damageest-reported-") as folder:
+        path = Path(folder) / "scan.ply"
+        write_points(path, dict(zip("xyz", draw.scan.points.T, strict=True)) | (columns or {}))
+        return replace(draw, scan=read_scan([path], "mm"))
 
 
 def take(name: str, seed: int, toward: Sequence[float] = (), radius: float = 0.09) -> Bench:

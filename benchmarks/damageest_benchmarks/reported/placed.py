@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-import tempfile
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from damageest.artefacts import Mesh
 from damageest.geometry.solids import to_arrays, to_manifold, to_solid
-from damageest.io.meshes import write_points
-from damageest.io.scans import read_scan
 from damageest_benchmarks.families.scene import Draw
-from damageest_benchmarks.reported.bench import Bench, bite, cut, take
+from damageest_benchmarks.reported.bench import Bench, bite, cut, read_again, take
 from damageest_benchmarks.troubles.parts import make_named_part
 
 
@@ -110,12 +106,7 @@ def normals_of_a_mirrored_half() -> Draw:
 def normals_that_are_no_numbers() -> Draw:
     """A program wrote nan for all normals when it froze the pose."""
     draw = _finish(take("block", 69))
-    columns = dict(zip("xyz", draw.scan.points.T, strict=True))
-    columns |= {name: np.full(len(draw.scan.points), np.nan) for name in ("nx", "ny", "nz")}
-    with tempfile.TemporaryDirectory(prefix="damageest-reported-") as folder:
-        path = Path(folder) / "scan.ply"
-        write_points(path, columns)
-        return replace(draw, scan=read_scan([path], "mm"))
+    return read_again(draw, {name: np.full(len(draw.scan.points), np.nan) for name in ("nx", "ny", "nz")})
 
 
 def two_pieces_apart() -> Draw:
