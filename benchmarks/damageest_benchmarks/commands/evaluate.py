@@ -43,7 +43,6 @@ from damageest_benchmarks.commands import (
 )
 from damageest_benchmarks.commands._counted import prepare_places
 from damageest_benchmarks.commands.intervals import show_intervals
-from damageest_benchmarks.reported.command import command as reported
 
 if TYPE_CHECKING:
     from damageest_benchmarks.matrix import MatrixCell
@@ -58,7 +57,7 @@ app.command("named")(named.command)
 app.command("others")(others.command)
 app.command("real")(real.command)
 app.command("realistic")(realistic.command)
-app.command("reported")(reported)
+app.command("reported")(others.reported)
 app.command("steady")(steady.command)
 app.command("sections")(sections.command)
 app.command("speed")(speed.command)

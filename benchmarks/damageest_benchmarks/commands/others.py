@@ -1,4 +1,4 @@
-"""`damageest evaluate others`: parts that others made, with drawn losses."""
+"""`damageest evaluate others` and `reported`: parts that others made, and what they report in public."""
 
 from __future__ import annotations
 
@@ -42,3 +42,45 @@ def command(
     table = format_markdown(make_others_table(rows))
     show_table(table, rows, as_json)
     write_measured(table, "others", write)
+
+
+def reported(
+    words: Annotated[
+        list[str] | None, typer.Argument(help="Words of a report's kind or address. Default: all reports.")
+    ] = None,
+    workers: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
+    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
+    out: Annotated[
+        Path | None, typer.Option(file_okay=False, help="Folder for reported.jsonl, to resume from.")
+    ] = None,
+    write: Annotated[
+        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Run what users of other tools report in public, made anew with known truth.
+
+    Scans that were filtered, filled, smoothed or doubled, sensors that are wrong, models that are coarse or inside out.
+    """
+    from damageest_evaluate.commands.counted import run_counted, show_table
+    from damageest_evaluate.job import fingerprint_code
+    from damageest_evaluate.tables import format_markdown
+
+    from damageest.errors import InputError
+    from damageest.registry import Registry
+    from damageest_benchmarks.commands._counted import prepare_places, write_measured
+    from damageest_benchmarks.reported.case import (
+        describe_reported_row,
+        make_reported_cases,
+        make_reported_table,
+        summarise,
+    )
+
+    prepare_places(out, write, "reported")
+    cases = make_reported_cases(words or (), fingerprint_code(Registry.discover()))
+    if not cases:
+        raise InputError(f"no report has one of the words {', '.join(words or ())}; leave them out for all reports")
+    rows = run_counted(cases, out, "reported.jsonl", workers, timeout, describe_reported_row)
+    table = f"{format_markdown(make_reported_table(rows))}\n\n{summarise(rows)}"
+    show_table(table, rows, as_json)
+    write_measured(table, "reported", write)
