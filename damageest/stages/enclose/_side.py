@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Flags, Floats, Part
+from damageest.artefacts import INTACT, Flags, Floats, Ints, Part
 from damageest.geometry.local_fits import smooth_points
 from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
 from damageest.geometry.orientation import find_signs
@@ -28,6 +28,8 @@ AROUND = 12
 FIT_COUNT = 24
 LEAST_SHARE = 0.1
 """Share of the skin beside a site that no point shows, which has to be behind for any to be."""
+MOST = 20_000
+"""Damaged points, at most, whose normals tell the side: more of them say the same, and take seconds."""
 FEWEST = 8
 """Intact points at the rim, at least, for them to show the side."""
 
@@ -51,7 +53,7 @@ def find_behind(field: ScanField, damaged: DamagedPoints, skin: SkinSamples) -> 
     rim = rim[pick_one_per_cube(aligned.points[rim], 0.5 * cell)] if len(rim) else rim
     if len(rim) < FEWEST:
         return behind
-    few = pick_one_per_cube(damaged.points, 0.5 * cell)
+    few = _pick_few(damaged.points, 0.5 * cell)
     own = damaged.points[few]
     points = np.concatenate([own, aligned.points[rim]])
     points, normals, _ = smooth_points(points, aligned.noise, min(FIT_COUNT, len(points) // 2))
@@ -76,6 +78,15 @@ def find_behind(field: ScanField, damaged: DamagedPoints, skin: SkinSamples) -> 
     share = np.bincount(site, is_behind) / np.maximum(np.bincount(site), 1)
     behind[asked] = is_behind & (share[site] > LEAST_SHARE)
     return behind
+
+
+def _pick_few(points: Floats, cell: float) -> Ints:
+    """Indices of one of the points (N,3) in each cube of edge ``cell``, or of larger cubes where those are too many."""
+    few = pick_one_per_cube(points, cell)
+    while len(few) > MOST:
+        cell *= 2
+        few = few[pick_one_per_cube(points[few], cell)]
+    return few
 
 
 def _measure_walls(part: Part, skin: Floats, normals: Floats) -> Floats:
