@@ -15,8 +15,9 @@ from damageest.io.given import as_part, as_scan
 from damageest.io.part_store import use_part_store
 from damageest.isolation import Limits, keep_one_thread
 from damageest.job import Job, load
+from damageest.pipeline.begin import start
 from damageest.pipeline.cache import digest
-from damageest.pipeline.engine import Engine, Route, follow, start
+from damageest.pipeline.engine import Engine, Route, follow
 from damageest.pipeline.notebook import find_notebook
 from damageest.pipeline.routes import WRITE, route_of
 from damageest.pipeline.state import JobState

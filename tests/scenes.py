@@ -12,7 +12,7 @@ from manifold3d import Manifold
 from damageest.artefacts import Deviation, Floats, Mesh, Part, Samples, Scan, Sites, Solid
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.solids import to_arrays
-from damageest.pipeline.placing.skin_points import sample_near_damage
+from damageest.pipeline.near_damage import sample_near_damage
 from damageest.stages.cluster.dbscan import Dbscan
 from damageest.stages.enclose.implicit import Implicit
 from damageest.stages.segment.mesh_distance import MeshDistance

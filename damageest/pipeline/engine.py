@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 import typing
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
 
@@ -16,7 +16,7 @@ from damageest.isolation.lost_threads import raise_lost
 from damageest.job.model import Job
 from damageest.pipeline.cache import digest
 from damageest.pipeline.calls import call_guarded, run_stage
-from damageest.pipeline.reach import find_reach
+from damageest.pipeline.near_damage import sample_near_damage
 from damageest.pipeline.stage_errors import locate_error
 from damageest.pipeline.state import Candidate, FoundSite, JobState, list_given
 from damageest.pipeline.steps import GATHERED, Step
@@ -26,22 +26,9 @@ from damageest.registry.outputs import check_output
 from damageest.registry.registry import Registry
 from damageest.result import StageRecord, StepRecord
 from damageest.rules.notes import make_notes
-from damageest.stages.adapt import Adapt
-from damageest.stages.align import Align
 from damageest.stages.cluster import Cluster
-from damageest.stages.enclose import Enclose, EncloseAll
-from damageest.stages.scan import ReadScan
+from damageest.stages.sample import Sample
 from damageest.stages.segment import Segment
-
-OPTIONS: dict[str, Contract] = {
-    "reader": ReadScan,
-    "aligner": Align,
-    "adapter": Adapt,
-    "segmenter": Segment,
-    "encloser": Enclose,
-    "encloser_at_once": EncloseAll,
-}
-"""The stages whose options steps read, by the names of these values."""
 
 TELLING = (Segment, Cluster)
 """The contracts of a route whose notes are those of the run."""
@@ -89,15 +76,16 @@ class Engine:
         return replace(self, job=replace(self.job, stages=stages, implementations=items), records=[], silent=True)
 
     def call(self, contract: Contract, state: S) -> S:
-        """Runs the job's implementation of a contract on a state, or takes what it gave before on the same."""
+        """Runs the job's implementation of a contract on a state, or takes what it gave before on the same. Points on
+        the skin that it takes are made for it."""
         if contract in self.job.given:
             value = self.job.given[contract]
             return state.with_named(contract.gives, value, digest(value))
         stage, item = self.job.stages[contract], self.job.implementations[contract]
         hooks, where = self.registry.hooks.hook, (contract.stage, item.name, state.number)
         named = dict(zip(("stage", "use", "site"), where, strict=True))
-        needs = item.cls.needs()
-        key = digest(self.describe(contract), [state.key(name) for name in needs])
+        needs, taken = item.cls.needs(), self.fill(item.cls.needs(), state)
+        key = digest(self.describe(contract), [taken.key(name) for name in needs])
         tell = _tell_nobody if self.silent else _tell
         tell(hooks.damageest_before_stage, **named)
         start = time.perf_counter()
@@ -107,7 +95,7 @@ class Engine:
                     contract.stage + (f"-{state.number}" if state.number else ""),
                     key,
                     lambda: _check_value(
-                        run_stage(stage, item, {name: state.get(name) for name in needs}, self.limits, state.number),
+                        run_stage(stage, item, {name: taken.get(name) for name in needs}, self.limits, state.number),
                         contract,
                         state,
                     ),
@@ -122,6 +110,23 @@ class Engine:
         self.records.append(StageRecord(*where[:2], str(item.provider), state.number, round(seconds, 3), cached))
         tell(hooks.damageest_after_stage, **named, output=value, seconds=seconds, cached=cached)
         return state.with_named(contract.gives, value, key)
+
+    def fill(self, needs: Collection[str], state: S) -> S:
+        """The state with those points on the skin that an implementation ``needs`` and the state has not: they are
+        made once for a part and a tolerance, and not at all where nothing takes them."""
+        job = state if isinstance(state, JobState) else state.job
+        if "samples" in needs and job.samples is None:
+            key = digest(self.describe(Sample), [job.key(name) for name in self.needs(Sample)])
+            made = job.with_named("samples", self.memo[key], key) if key in self.memo else self.call(Sample, job)
+            state = state.with_named("samples", made.samples, made.key("samples"))
+        if "nearby" in needs and job.nearby is None:
+            made = self.take(sample_near_damage, job)
+            state = state.with_named("nearby", made.nearby, made.key("nearby"))
+        return state
+
+    def needs(self, contract: Contract) -> tuple[str, ...]:
+        """What the job's implementation of a contract takes."""
+        return tuple(self.job.implementations[contract].cls.needs())
 
     def ask(self, contract: Contract, function: Callable[[], T], kind: type) -> T:
         """What another method of the job's implementation gives than ``run``; of the type ``kind``.
@@ -178,7 +183,9 @@ class Engine:
         if contract not in self.job.stages:
             return digest(contract.stage)
         item = self.job.implementations[contract]
-        return digest(contract.stage, item.name, item.provider.fingerprint, self.job.stages[contract].model_dump())
+        points = self.describe(Sample) if "samples" in item.cls.needs() and contract is not Sample else ""
+        options = self.job.stages[contract].model_dump()
+        return digest(points, contract.stage, item.name, item.provider.fingerprint, options)
 
     def remember(self, name: str, key: str, compute: Callable[[], Any], keep: bool = True) -> tuple[bool, Any]:
         """(was it known, value): from this run's memory, else from the cache, else computed and kept."""
@@ -244,34 +251,6 @@ def call_each(engine: Engine, contract: Contract, state: JobState) -> JobState:
     key = digest(contract.stage, [candidate.key(contract.gives) for candidate in done], state.key("candidates"))
     state = state.with_value(JobState.failures, (*state.failures, *failures), key)
     return state.with_value(JobState.candidates, tuple(replace(one, job=JobState()) for one in done), key)
-
-
-def start(engine: Engine) -> JobState:
-    """The state before any stage: what the job and the registry say."""
-    job, registry = engine.job, engine.registry
-    state = JobState().with_value(JobState.name, job.name).with_value(JobState.unit, job.units)
-    state = state.with_named("tolerance", job.tolerance, digest(job.tolerance))
-    state = state.with_value(JobState.asked_tolerance, job.tolerance)
-    state = state.with_value(JobState.choice, job.sites, digest(job.sites.model_dump()))
-    state = state.with_value(JobState.accept, job.accept)
-    for name, told in (("scanner", job.scanner), ("temperature", job.temperature)):
-        state = state.with_named(name, told, digest(str(told and told.model_dump())))
-    asked = digest([one.model_dump() for one in job.sections])
-    state = state.with_value(JobState.asked_sections, job.sections, asked)
-    for name, contract in OPTIONS.items():  # the content of files that they name is in the key of what they give
-        stage = job.stages.get(contract)
-        state = state.with_named(name, stage, digest(str(stage and stage.model_dump())))
-    state = state.with_value(JobState.rules, registry.rules, digest([rule.code for rule in registry.rules]))
-    state = state.with_value(JobState.terms, registry.terms, digest([term.name for term in registry.terms]))
-    state = state.with_value(JobState.writers, registry.writers, digest(sorted(registry.writers)))
-    state = state.with_value(JobState.path_writers, registry.path_writers, digest(sorted(registry.path_writers)))
-    state = state.with_value(JobState.conversions, registry.conversions, digest(sorted(registry.conversions)))
-    state = state.with_value(JobState.reach, find_reach(job, registry))
-    for name in ("samples", "nearby"):  # until an implementation takes them
-        state = state.with_named(name, None, digest(None))
-    for name in ("candidates", "found", "failures", "warnings"):
-        state = state.with_named(name, (), digest(()))
-    return state.with_value(JobState.wanted, None)
 
 
 def _tell(hook: Callable[..., Any], **what: Any) -> None:

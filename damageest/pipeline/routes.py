@@ -3,7 +3,7 @@
 A contract calls the implementation that the job names, once per job or once per site as the contract says. A step is
 the code between them. Beside each stands what it takes and what it gives, by the names of `JobState` and, for what is
 called once per site, of `Candidate`; ``+``: it adds to what is there; ``calls``: contracts that a step calls itself. A
-test compares these lines with the code.
+test compares these lines with the code. Points on the skin are made where an implementation takes them.
 """
 
 from __future__ import annotations
@@ -47,15 +47,12 @@ from damageest.pipeline.placing.prepare import (
 )
 from damageest.pipeline.placing.scanner import correct_temperature, weigh_scanner
 from damageest.pipeline.placing.selections import check_selections
-from damageest.pipeline.placing.skin_points import sample_near_damage, where_taken
 from damageest.pipeline.writing import (
     describe_output,
     show_result,
     write_measured,
     write_output,
 )
-from damageest.stages.align import Align
-from damageest.stages.background import Background
 from damageest.stages.boolean import Boolean
 from damageest.stages.boundary import Boundary
 from damageest.stages.cluster import Cluster
@@ -64,7 +61,6 @@ from damageest.stages.export import Export
 from damageest.stages.part import ReadPart
 from damageest.stages.reconstruct import Reconstruct
 from damageest.stages.repair import Repair
-from damageest.stages.sample import Sample
 from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 
@@ -78,10 +74,6 @@ ACQUIRE: Route = (
     take_tolerance,  # scan, part, measured_noise, measured_spacing, depth_step, asked_tolerance
     #     -> tolerance, +warnings
     remove_filled_points,  # scan, measured_noise, measured_spacing -> scan, +warnings
-    where_taken(  # samples
-        Sample,  # part, tolerance -> samples
-        by=(Align, Segment, EncloseAll),
-    ),
     align_scan,  # calls Align: adapter, aligner, tolerance, asked_tolerance, part, scan, samples
     #     -> scan, part, pose, refusal, +warnings
     add_points_near_damage,  # reader, scan, pose, part, tolerance, unit, thermal_scale, scan_centre -> scan
@@ -89,8 +81,8 @@ ACQUIRE: Route = (
     correct_views,  # calls Align: registration, asked_tolerance, aligner, unit, scan, part, samples, tolerance
     #     -> registration, views
     correct_scale,  # registration, unit, reader, scan_centre -> registration, corrected_scale
-    adapt_part,  # calls Adapt, Align, Sample: registration, part, aligned, pose, refusal, samples, tolerance, unit,
-    #     views, adapter, aligner, scan -> registration, adapted, samples, asked_fit
+    adapt_part,  # calls Adapt, Align: registration, part, aligned, pose, refusal, tolerance, unit, views, adapter,
+    #     aligner, scan, samples -> registration, adapted, asked_fit
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
     inspect_skin,  # field, segmenter -> skin, deviation
@@ -106,10 +98,6 @@ BY_SITE: Route = (
     take_clusters,  # aligned, sites, encloser, wanted -> candidates
     Reconstruct,  # points, part, tolerance, spacing, noise -> surface
     Boundary,  # surface, part, tolerance -> rims
-    where_taken(  # samples
-        Sample,  # part, tolerance -> samples
-        by=(Background,),
-    ),
     enclose_grouped,  # calls Background, Enclose: candidates, aligned, sites, part, tolerance, spacing, intact, samples
     #     -> candidates, +failures
     Repair,  # enclosure, tolerance -> solid
@@ -117,10 +105,6 @@ BY_SITE: Route = (
     gather_sites,  # candidates, sites, field, unit -> found, +failures, +warnings
 )
 AT_ONCE: Route = (
-    where_taken(  # nearby
-        sample_near_damage,  # field, sites, encloser_at_once -> nearby
-        by=(EncloseAll,),
-    ),
     EncloseAll,  # part, aligned, deviation, sites, samples, nearby, tolerance -> enclosures
     take_enclosures,  # enclosures, aligned, sites, encloser_at_once -> candidates, +failures
     Boolean,  # solid, part -> damage
@@ -150,7 +134,7 @@ CLOSE: Route = (
     cut_sections,  # asked_sections, field, adapted, pose_error, sensor, unit -> sections, +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, field, pose, deviation, sites, found, failures,
     #     warnings, coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions,
-    #     sections, corrected_scale, thermal_scale, scan_centre, samples -> result
+    #     sections, corrected_scale, thermal_scale, scan_centre -> result
 )
 WRITE: Route = (
     Export,  # result, folder, writers, path_writers -> written

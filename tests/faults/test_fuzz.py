@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from damageest.job import load
-from damageest.pipeline.engine import Engine, follow, start
+from damageest.pipeline.begin import start
+from damageest.pipeline.engine import Engine, follow
 from damageest.pipeline.placing.prepare import place_scan
 from damageest.pipeline.routes import route_of
 from damageest.registry import Registry

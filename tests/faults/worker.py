@@ -39,7 +39,8 @@ def try_job(path: Path, mode: str, registry: Any) -> dict[str, Any]:
     from damageest.errors import DamageestError
     from damageest.isolation import Limits
     from damageest.job import load
-    from damageest.pipeline.engine import Engine, follow, start
+    from damageest.pipeline.begin import start
+    from damageest.pipeline.engine import Engine, follow
     from damageest.pipeline.placing.prepare import crop_scan
     from damageest.stages.part import ReadPart
     from damageest.stages.scan import ReadScan

@@ -8,7 +8,8 @@ from typing import Any
 from damageest.artefacts import Part, Scan
 from damageest.isolation import keep_one_thread
 from damageest.job import load
-from damageest.pipeline.engine import Branch, Engine, Step, follow, start
+from damageest.pipeline.begin import start
+from damageest.pipeline.engine import Branch, Engine, Step, follow
 from damageest.pipeline.routes import route_of
 from damageest.pipeline.state import JobState
 from damageest.registry import Registry

@@ -26,7 +26,8 @@ from damageest.artefacts import (
     Solid,
 )
 from damageest.errors import StageError
-from damageest.pipeline.engine import follow, start
+from damageest.pipeline.begin import start
+from damageest.pipeline.engine import follow
 from damageest.pipeline.finding.sites import take_enclosures
 from damageest.registry import Registry
 from damageest.registry.contracts import DEFAULTS

@@ -17,8 +17,9 @@ from damageest.artefacts import Floats, Part, Pose, Reason, Scan
 from damageest.geometry.scan_field import ScanField
 from damageest.job import load
 from damageest.pipeline import routes
+from damageest.pipeline.begin import start
 from damageest.pipeline.cache import Cache, digest
-from damageest.pipeline.engine import Branch, Engine, Route, start
+from damageest.pipeline.engine import Branch, Engine, Route
 from damageest.pipeline.placing.prepare import place_scan
 from damageest.pipeline.registration import Registration
 from damageest.pipeline.state import MADE_OF, Candidate, FoundSite, JobState, Reasons, Value, list_given

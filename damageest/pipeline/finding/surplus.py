@@ -18,7 +18,7 @@ from damageest.geometry.solids import to_manifold, to_solid
 from damageest.geometry.threads import count_threads
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.finding.sites import find_place
-from damageest.pipeline.placing.skin_points import sample_near_damage
+from damageest.pipeline.near_damage import sample_near_damage
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
 from damageest.stages.cluster import Cluster
@@ -199,8 +199,10 @@ def _enclose(engine: Engine, turned: JobState, kept: Sites) -> list[JoinedPieces
     box = complement_part(part, points[members], MARGIN * turned.tolerance)
     state = turned.with_value(JobState.part, box).with_value(JobState.deviation, deviation)
     state = state.with_value(JobState.sites, kept)
-    if turned.samples is not None:
-        state = state.with_value(JobState.samples, complement_samples(turned.samples))
+    if "samples" in engine.needs(EncloseAll):
+        samples = engine.fill(("samples",), turned).samples
+        assert samples is not None
+        state = state.with_value(JobState.samples, complement_samples(samples))
     encloser = engine.job.stages[EncloseAll]
     assert isinstance(encloser, EncloseAll)  # as it is called below
     nearby = sample_near_damage(replace(turned.field, deviation=deviation), kept, encloser)

@@ -15,11 +15,12 @@ from damageest.geometry.transforms import move_points
 from damageest.output.result_json import to_dict
 from damageest.pipeline.engine import Engine
 from damageest.pipeline.judging.uncertainty import shift_interval, shift_uncertainty
-from damageest.pipeline.placing.skin_points import note_unused
-from damageest.pipeline.state import FoundSite, JobState
+from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
+from damageest.registry.contracts import DEFAULTS
 from damageest.result import Result, Site
 from damageest.rules.notes import make_notes, rank_notes
+from damageest.stages.sample import Sample
 from damageest.trust.interval.budget import UNKNOWN
 
 
@@ -28,7 +29,7 @@ from damageest.trust.interval.budget import UNKNOWN
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "field", "pose", "deviation", "sites", "found",
         "failures", "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
-        "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre", "samples",
+        "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -66,9 +67,7 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         sites=sites,
         damage=damage,
         undamaged=subtract_from_part(part, accepted, lost),
-        warnings=rank_notes(
-            (*state.warnings, *note_unused(engine, state.samples), *make_notes("renamed", engine.job.notes))
-        ),
+        warnings=rank_notes((*state.warnings, *_note_unused(engine), *make_notes("renamed", engine.job.notes))),
         failures=tuple(str(error) for error in state.failures),
         truth=_compare_with_truth(found, scan, state.pose, state.tolerance, state.adapted is not None),
         stages=tuple(engine.records),
@@ -87,6 +86,15 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         scan_centre=state.scan_centre,
         volume_95=shift_interval(state.volume_95, (damage.volume if damage else 0.0) - alone),
     )
+
+
+def _note_unused(engine: Engine) -> Reasons:
+    """Names stage `sample` where the job changes it and nothing took its points."""
+    stage, usual = engine.job.stages[Sample], engine.registry.get(Sample.stage, DEFAULTS[Sample])
+    is_used = Sample in engine.job.given or any(record.stage == Sample.stage for record in engine.records)
+    if is_used or (stage.use == usual.name and stage == usual.cls.model_validate({})):
+        return ()
+    return make_notes(Sample.stage, (f"sample: {stage.use} did not run: no stage uses its points",))
 
 
 def _describe_site(found: FoundSite, field: ScanField) -> Site:

@@ -10,4 +10,3 @@
 # selections.py: checks what a job says of the part's skin and CAD faces as soon as the part is read
 # shared.py: what can be compared, where an earlier scan stands for the part
 # shared_table.py: whether an earlier and a later scan were laid on each other by a table that both show
-# skin_points.py: points on the part's skin

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Floats, Part, Pose, Samples
+from damageest.artefacts import AdaptedPart, Floats, Part, Pose
 from damageest.errors import StageError
 from damageest.geometry.distance import signed_distance
 from damageest.geometry.scan_field import ScanField
@@ -21,7 +21,6 @@ from damageest.pipeline.steps import step
 from damageest.rules.notes import make_notes
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
-from damageest.stages.sample import Sample
 from damageest.trust.model_fit import AskedFit, measure_fit
 from damageest.trust.views.two_sheets import measure_sheets
 
@@ -43,27 +42,25 @@ BY_FORM = "another_part"
 
 
 @step(
-    gives=("registration", "adapted", "samples", "asked_fit"),
+    gives=("registration", "adapted", "asked_fit"),
     reads=(
-        "registration", "part", "aligned", "pose", "refusal", "samples", "tolerance", "unit", "views", "adapter",
+        "registration", "part", "aligned", "pose", "refusal", "tolerance", "unit", "views", "adapter",
         "aligner",
     ),
-    calls=(Adapt, Align, Sample),
+    calls=(Adapt, Align),
 )  # fmt: skip
-def adapt_part(
-    engine: Engine, state: JobState
-) -> tuple[Registration, AdaptedPart | None, Samples | None, AskedFit | None]:
+def adapt_part(engine: Engine, state: JobState) -> tuple[Registration, AdaptedPart | None, AskedFit | None]:
     """Calls `adapt`, unless the job takes the part as designed, and puts what it gives in the place of the part, with
-    the scan and its pose moved onto it, and samples on its skin where an implementation takes them. Where the fit of
-    the model was measured to ask whether the part is as designed, and the part stays so, it gives that too. Raises the
-    refusal of stage `align` where the adapted part does not explain the scan either."""
+    the scan and its pose moved onto it. Where the fit of the model was measured to ask whether the part is as designed,
+    and the part stays so, it gives that too. Raises the refusal of stage `align` where the adapted part does not
+    explain the scan either."""
     called, asked, failed = call_adapt(engine, state)
     here = state.registration
     if called is None or called.get(Adapt.gives) is None:
         if state.refusal is not None:
             raise state.refusal
         here = replace(here, warnings=(*here.warnings, *make_notes("adapt", failed))) if failed else here
-        return here, None, state.samples, asked
+        return here, None, asked
     adapted: AdaptedPart = called.get(Adapt.gives)
     key = called.key(Adapt.gives)
     aligned = state.aligned.move(adapted.motion)
@@ -73,14 +70,13 @@ def adapt_part(
     moved = state.with_value(JobState.aligned, aligned, digest("aligned", key))
     moved = moved.with_value(JobState.part, adapted.part, digest("part", key))
     own = engine.make_silent()
-    samples: Samples | None = None if state.samples is None else own.call(Sample, moved).get(Sample.gives)
     if pose.doubts or pose.free:
         with suppress(StageError):  # a given pose, which the adapted part moves away from, keeps its doubts
             pose = recheck_pose(pose, own.call(Align, moved).get(Align.gives), aligned.points, state.tolerance)
     told = (*drop_settled(here.warnings, here.pose, pose), *make_notes("adapt", adapted.notes))
     told += tuple(note_datums(adapted, state.aligner, adapted.part, state.tolerance, state.unit))
     here = replace(here, part=adapted.part, aligned=aligned, pose=pose, warnings=told)
-    return here, adapted, samples, None
+    return here, adapted, None
 
 
 def drop_settled(warnings: Reasons, before: Pose, after: Pose) -> Reasons:

@@ -20,8 +20,9 @@ from damageest.geometry.pieces_of_part import is_piece
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.units import diagnose_scale, diagnose_size, question_size
 from damageest.job.model import Job
+from damageest.pipeline.begin import start
 from damageest.pipeline.cache import Cache
-from damageest.pipeline.engine import Engine, follow, start
+from damageest.pipeline.engine import Engine, follow
 from damageest.pipeline.placing.large_scans import check_crops
 from damageest.pipeline.placing.shared import keep_shared
 from damageest.pipeline.state import Reasons

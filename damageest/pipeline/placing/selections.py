@@ -6,7 +6,8 @@ from damageest.artefacts import Part
 from damageest.errors import Fault, JobError, StageError
 from damageest.geometry.near_faces import name_nearest_skin
 from damageest.job.model import Job
-from damageest.pipeline.engine import Engine, follow, start
+from damageest.pipeline.begin import start
+from damageest.pipeline.engine import Engine, follow
 from damageest.pipeline.steps import step
 from damageest.registry.registry import Registry
 from damageest.stages.part import ReadPart

@@ -12,7 +12,7 @@ from scipy.spatial import KDTree
 from damageest.artefacts import Enclosures, Sites
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import iou, to_manifold, to_solid, unite
-from damageest.pipeline.placing.skin_points import sample_near_damage
+from damageest.pipeline.near_damage import sample_near_damage
 from damageest.stages.enclose.implicit import Implicit
 from damageest.stages.sample.edge_aware import EdgeAware
 from tests.scenes import TOLERANCE, Scene, scene
