@@ -23,15 +23,14 @@ from damageest.pipeline.finding.surplus import find_surplus, relate_surplus
 from damageest.pipeline.judging.collect import collect_result
 from damageest.pipeline.judging.deposits import make_deposits
 from damageest.pipeline.judging.paths import plan_paths
+from damageest.pipeline.judging.scan_errors import measure_scan_errors
 from damageest.pipeline.judging.sections import cut_sections
 from damageest.pipeline.judging.sensor import (
     dismiss_explained_clusters,
     dismiss_explained_sites,
-    look_for_sheets,
-    measure_sensor,
 )
 from damageest.pipeline.judging.uncertainty import measure_uncertainty, sum_uncertainty
-from damageest.pipeline.judging.verdicts import choose_sites, gather_facts, judge_sites
+from damageest.pipeline.judging.verdicts import choose_sites, judge_sites
 from damageest.pipeline.placing.adapt import adapt_part
 from damageest.pipeline.placing.alignment import align_scan
 from damageest.pipeline.placing.form import correct_scale, correct_views, fit_model, review_model_fit
@@ -45,8 +44,8 @@ from damageest.pipeline.placing.prepare import (
     settle_tolerance,
     take_tolerance,
 )
-from damageest.pipeline.placing.scanner import correct_temperature, weigh_scanner
 from damageest.pipeline.placing.selections import check_selections
+from damageest.pipeline.placing.temperature import correct_temperature
 from damageest.pipeline.writing import (
     describe_output,
     show_result,
@@ -85,10 +84,9 @@ ACQUIRE: Route = (
     #     aligner, scan, samples -> registration, adapted, asked_fit
     settle_tolerance,  # tolerance, asked_tolerance, part, aligned -> tolerance, +warnings
     Segment,  # aligned, part, samples, tolerance -> deviation
-    inspect_skin,  # field, segmenter -> skin, deviation
+    inspect_skin,  # field, segmenter -> skin, deviation, sheets
     Cluster,  # aligned, deviation, tolerance -> sites
     check_clusters,  # sites, field ->
-    look_for_sheets,  # field -> sheets
     find_surplus,  # calls Cluster, EncloseAll: unit, sheets, field, aligned, deviation, tolerance, part, sites,
     #     samples, nearby -> surplus, deviation, +warnings
     fit_model,  # field, adapted, surplus, unit, views, corrected_scale, asked_fit -> fitted, +warnings
@@ -116,13 +114,11 @@ CLOSE: Route = (
     choose_sites,  # found, choice, field -> found, +warnings
     describe_coverage,  # field, skin, found -> coverage
     relate_surplus,  # surplus, found, field, unit -> surplus, found, +warnings
-    gather_facts,  # field, skin, surplus, sheets, pose, aligner, unit, fitted, adapted -> facts
-    measure_sensor,  # field, sites, facts, explained, depth_step, pose, aligner -> pose_error, sensor
-    weigh_scanner,  # scanner, temperature, corrected_scale, fitted, field, pose_error, facts, unit
-    #     -> scanner_errors, +warnings
-    measure_uncertainty,  # found, part, aligned, field, adapted, skin, coverage, facts, fitted, pose, pose_error,
-    #     scanner_errors, terms, tolerance, unit, adapter, warnings -> found
-    judge_sites,  # found, accept, rules, terms, facts, field, skin, coverage, pose, unit, views, aligner -> found
+    measure_scan_errors,  # field, skin, surplus, sheets, pose, aligner, unit, fitted, adapted, sites, explained,
+    #     depth_step, scanner, temperature, corrected_scale -> errors, sensor, +warnings
+    measure_uncertainty,  # found, part, aligned, field, adapted, skin, coverage, errors, fitted, pose, terms,
+    #     tolerance, unit, adapter, warnings -> found
+    judge_sites,  # found, accept, rules, terms, errors, field, skin, coverage, pose, unit, views, aligner -> found
     dismiss_explained_sites,  # found, sensor, explained, sheets, aligner, accept, tolerance, asked_tolerance, unit,
     #     field -> found, folded, +warnings
     review_model_fit,  # fitted, surplus, found, pose, field, adapted, skin, unit, explained, warnings
@@ -131,9 +127,9 @@ CLOSE: Route = (
     plan_paths,  # calls Path: found, part, tolerance, reach -> found, +failures
     sum_uncertainty,  # found, failures, pose, field, adapted, folded, views, sensor, unit
     #     -> volume_95, budget
-    cut_sections,  # asked_sections, field, adapted, pose_error, sensor, unit -> sections, +warnings
+    cut_sections,  # asked_sections, field, adapted, errors, sensor, unit -> sections, +warnings
     collect_result,  # name, unit, tolerance, part, scan, aligned, field, pose, deviation, sites, found, failures,
-    #     warnings, coverage, surplus, adapted, fitted, sensor, volume_95, budget, scanner_errors, conversions,
+    #     warnings, coverage, surplus, adapted, fitted, sensor, volume_95, budget, errors, conversions,
     #     sections, corrected_scale, thermal_scale, scan_centre -> result
 )
 WRITE: Route = (

@@ -44,7 +44,7 @@ from damageest.job.sections import SectionChoice
 from damageest.pipeline.cache import digest
 from damageest.pipeline.registration import Registration
 from damageest.result import Conversion, Result
-from damageest.rules import Rule, ScanFacts, Term
+from damageest.rules import Rule, Term
 from damageest.stages.adapt import Adapt
 from damageest.stages.align import Align
 from damageest.stages.enclose import Enclose, EncloseAll
@@ -54,8 +54,7 @@ from damageest.stages.scan import ReadScan
 from damageest.stages.segment import Segment
 from damageest.trust.beyond_points import BeyondPoints
 from damageest.trust.interval.free_pose import Dependence
-from damageest.trust.interval.pose_error import PoseError
-from damageest.trust.interval.scanner import ScannerErrors
+from damageest.trust.interval.loss import ScanErrors
 from damageest.trust.interval.site_error import SiteError
 from damageest.trust.model_fit import AskedFit, FittedModel
 from damageest.trust.skin.coverage import SkinView
@@ -230,8 +229,8 @@ class JobState(State):
     sites that have no damage volume or no deposit. ``folder``: that the files are written into, ``target``: that they
     will be in. ``content``: that of result.json; ``job_text``: that of job.yaml. ``thermal_scale``: what the scan was
     divided by for the part's temperature, about ``scan_centre`` (3,). ``field``: part, aligned scan, deviation and
-    tolerance as one value, which no step gives: it is that of the state. ``scanner_errors``: of the whole scan by
-    certificate and temperature; ``budget``: of the total volume. ``sheets``: two surfaces over the same skin;
+    tolerance as one value, which no step gives: it is that of the state. ``errors``: that all sites have in
+    common; ``budget``: of the total volume. ``sheets``: two surfaces over the same skin;
     ``explained``: places that views which lie apart explain, no sites.
     """
 
@@ -286,9 +285,7 @@ class JobState(State):
     scan_centre = Value[Floats]()
     fitted = Value[FittedModel | None]()
     coverage = Value[Coverage]()
-    facts = Value[ScanFacts]()
-    pose_error = Value[PoseError]()
-    scanner_errors = Value[ScannerErrors]()
+    errors = Value[ScanErrors]()
     sensor = Value[Sensor]()
     folded = Value[float]()
     sheets = Value[Sheets]()

@@ -54,7 +54,7 @@ def test_noise_below_the_tolerance_that_alone_makes_very_many_places_is_refused(
     scan = Simulate(points=40_000, noise=0.2, pose="identity" if pose == "known" else "random", seed=3).run("mm", part)
     align = "none" if pose == "known" else "register"
     with pytest.raises(InputError, match=r"scatter by 0\.(19|2|21) mm: .* places are no deeper .* at least 0\.(7|8)"):
-        run_until("look_for_sheets", part, scan, registry, tolerance=0.25, align=align)
+        run_until("find_surplus", part, scan, registry, tolerance=0.25, align=align)
 
 
 @pytest.mark.parametrize("deeper", [0, 400], ids=["noise alone", "and damage"])

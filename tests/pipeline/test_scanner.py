@@ -74,7 +74,9 @@ def run(align: str, offset: float = 0.0, scale: float = 1.0, more: str = "{}") -
     return damageest.run(job, part=make_box(), scan=make_scan(offset, scale))
 
 
-def run_until_weighed(registry: Registry, scale: float = 1.0, step: str = "weigh_scanner", **more: Any) -> Halfway:
+def run_until_weighed(
+    registry: Registry, scale: float = 1.0, step: str = "measure_scan_errors", **more: Any
+) -> Halfway:
     job = {"tolerance": TOLERANCE, "align": "none", "adapt": "none", **more}
     return run_until(step, make_box(), make_scan(scale=scale), registry, **job)
 

@@ -16,13 +16,14 @@ from damageest.trust.skin.coverage import SkinView, measure_coverage
 from damageest.trust.skin.facing import find_turned
 from damageest.trust.skin.ray_evidence import trace_rays
 from damageest.trust.skin.skin_cells import cut_skin, find_seen
+from damageest.trust.views.two_sheets import Sheets, measure_sheets
 
 
-@step(gives=("skin", "deviation"))
-def inspect_skin(field: ScanField, segmenter: Segment | None) -> tuple[SkinView, Deviation]:
+@step(gives=("skin", "deviation", "sheets"))
+def inspect_skin(field: ScanField, segmenter: Segment | None) -> tuple[SkinView, Deviation, Sheets]:
     """Maps what the scan shows of the skin, and labels as damage the points that lie on no skin: those that face
-    another way, and those that rays reached through lost metal. Raises StageError where too few points near the part
-    are intact."""
+    another way, and those that rays reached through lost metal. Looks for two surfaces over the same skin. Raises
+    StageError where too few points near the part are intact."""
     _check_intact(field, segmenter)
     label = field.label.copy()
     label[find_turned(field)] = DAMAGE
@@ -34,7 +35,8 @@ def inspect_skin(field: ScanField, segmenter: Segment | None) -> tuple[SkinView,
         rooted = deviation.label.copy()
         rooted[rays.roots[rooted[rays.roots] == INTACT]] = DAMAGE
         deviation = replace(deviation, label=rooted)
-    return SkinView(cells, seen, perhaps_seen, distance, rays), deviation
+    sheets = measure_sheets(replace(field, deviation=deviation))
+    return SkinView(cells, seen, perhaps_seen, distance, rays), deviation, sheets
 
 
 def _check_intact(field: ScanField, segmenter: Segment | None) -> None:

@@ -29,7 +29,7 @@ from damageest.trust.interval.budget import UNKNOWN
     reads=(
         "name", "unit", "tolerance", "part", "scan", "aligned", "field", "pose", "deviation", "sites", "found",
         "failures", "warnings", "coverage", "surplus", "adapted", "fitted", "sensor", "volume_95", "budget",
-        "scanner_errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre",
+        "errors", "conversions", "sections", "corrected_scale", "thermal_scale", "scan_centre",
     ),
 )  # fmt: skip
 def collect_result(engine: Engine, state: JobState) -> Result:
@@ -78,8 +78,8 @@ def collect_result(engine: Engine, state: JobState) -> Result:
         fit=None if state.fitted is None else state.fitted.fit,
         sensor=state.sensor,
         budget=state.budget,
-        not_in_budget=tuple(UNKNOWN[name] for name in state.scanner_errors.unknown),
-        certificate=state.scanner_errors.certificate,
+        not_in_budget=tuple(UNKNOWN[name] for name in state.errors.scanner.unknown),
+        certificate=state.errors.scanner.certificate,
         conversions={"dict": to_dict, **state.conversions},
         sections=state.sections,
         scan_factor=state.thermal_scale * state.corrected_scale,

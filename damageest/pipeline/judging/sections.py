@@ -12,12 +12,12 @@ from damageest.job.sections import SectionChoice
 from damageest.pipeline.state import Reasons
 from damageest.pipeline.steps import step
 from damageest.sections.measure import Scanned, measure_sections
-from damageest.trust.interval.pose_error import PoseError
+from damageest.trust.interval.loss import ScanErrors
 
 
 @step(gives=("sections", "warnings"))
 def cut_sections(
-    asked_sections: tuple[SectionChoice, ...], field: ScanField, adapted: AdaptedPart | None, pose_error: PoseError,
+    asked_sections: tuple[SectionChoice, ...], field: ScanField, adapted: AdaptedPart | None, errors: ScanErrors,
     sensor: Sensor, unit: str,
 ) -> tuple[tuple[Section, ...], Reasons]:  # fmt: skip
     """Measures sections against the part as designed, also where it was adapted: bow and twist are what the field of
@@ -30,7 +30,7 @@ def cut_sections(
         points = move_points(points, np.asarray(np.linalg.inv(adapted.motion), np.float64))
         designed = Mesh(part.vertices - adapted.displacement, part.faces)
     scanned = Scanned(
-        points, aligned.spacing, sensor.noise or aligned.noise, sensor.correlated, sensor.alike, pose_error, unit
+        points, aligned.spacing, sensor.noise or aligned.noise, sensor.correlated, sensor.alike, errors.pose, unit
     )
     sections = measure_sections(asked_sections, designed, scanned, field.tolerance, part.tessellation_error)
     notes = [Reason("section", f"section {one.number}, {one.name}: {note}") for one in sections for note in one.notes]

@@ -20,7 +20,7 @@ from damageest.trust.doubts.misplaced_view import AGAINST
 from damageest.trust.interval.pose_error import PoseError, measure_pose_error
 from damageest.trust.interval.semivariogram import measure_semivariogram
 from damageest.trust.interval.sensor import NEEDED, describe_sensor, measure_levels, measure_shown
-from damageest.trust.views.two_sheets import EXPLAINED, Sheets, measure_sheets, measure_two_sheets
+from damageest.trust.views.two_sheets import EXPLAINED, measure_two_sheets
 
 HIDES = 1.2
 """How many times larger than the tolerance the least depth that can be seen has to be, for shallower sites that are
@@ -36,7 +36,6 @@ UNSUPPORTED = {"intact_over", "intact_inside", "beyond_points", "off_boundary", 
 """Reasons against a volume of a few points, one of which says, with their number, that they bound none."""
 
 
-@step(gives=("pose_error", "sensor"))
 def measure_sensor(
     field: ScanField, sites: Sites, facts: ScanFacts, explained: Explained, depth_step: float, pose: Pose,
     aligner: Align | None,
@@ -51,12 +50,6 @@ def measure_sensor(
         measure_semivariogram(field),
     )  # fmt: skip
     return error, sensor
-
-
-@step(gives="sheets")
-def look_for_sheets(field: ScanField) -> Sheets:
-    """Looks for two surfaces over the same skin."""
-    return measure_sheets(field)
 
 
 @step(

@@ -25,7 +25,7 @@ from damageest.trust.interval.budget import make_depth_budget, make_volume_budge
 from damageest.trust.interval.fading import measure_fading
 from damageest.trust.interval.free_pose import measure_dependence, measure_hidden_wear
 from damageest.trust.interval.inner_surface import measure_inner_surface
-from damageest.trust.interval.loss import Loss, LossCase, ScanErrors, measure_shifts
+from damageest.trust.interval.loss import Loss, LossCase, measure_shifts
 from damageest.trust.interval.pose_error import PoseError
 from damageest.trust.interval.scanner import TERMS
 from damageest.trust.interval.shallow_loss import limit_shallow_loss
@@ -63,11 +63,9 @@ BESIDE = 2.0
         "adapted",
         "skin",
         "coverage",
-        "facts",
+        "errors",
         "fitted",
         "pose",
-        "pose_error",
-        "scanner_errors",
         "terms",
         "tolerance",
         "unit",
@@ -80,7 +78,7 @@ def measure_uncertainty(state: JobState) -> tuple[FoundSite, ...]:
     if not state.found:
         return state.found
     taken = _TakenSkin(state, state.found)
-    pose = state.pose_error.leave_out(state.pose.free, state.part.diagonal / 4)
+    pose = state.errors.pose.leave_out(state.pose.free, state.part.diagonal / 4)
     return tuple(_measure_site(state, site, taken, pose) for site in state.found)
 
 
@@ -158,9 +156,9 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     beyond = measure_beyond_points(site.damage, state.field, points, state.unit)
     site = replace(site, beyond=beyond)
     differ = WIDTH * compare_at_site(state.field, site.members, state.skin.cells.edge)
-    facts = replace(state.facts, between_views=max(state.facts.between_views, differ))
+    facts = replace(state.errors.facts, between_views=max(state.errors.facts.between_views, differ))
     loss = Loss(site.damage, inner, points, site.evidence, beyond)
-    errors = ScanErrors(pose, facts, state.scanner_errors)
+    errors = replace(state.errors, pose=pose, facts=facts)
     # what the model fit gives is the 95 % bound of a deviation
     case = LossCase(loss, state.field, errors, _measure_form(state, site), state.adapted)
     found = measure_site_error(case, state.terms, state.pose.free)

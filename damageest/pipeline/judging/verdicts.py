@@ -19,11 +19,10 @@ from damageest.pipeline.finding.sites import number_sites
 from damageest.pipeline.placing.datums import choose_on_datums, has_datums
 from damageest.pipeline.state import FoundSite, JobState, Reasons
 from damageest.pipeline.steps import step
-from damageest.rules import FreePose, ScanFacts, SiteCase, SiteFacts
+from damageest.rules import FreePose, SiteCase, SiteFacts
 from damageest.trust.doubts.one_motion import are_sound
 from damageest.trust.evidence import weigh_evidence
 from damageest.trust.interval.free_pose import describe_motion
-from damageest.trust.scan_facts import gather_scan_facts
 from damageest.trust.skin.coverage import SkinView, find_removed_cells
 from damageest.trust.verdict import apply_to_sites, compare_sites, decide, measure_facts, open_end
 
@@ -62,20 +61,7 @@ def choose_sites(
     return tuple(sites[number] for number in sorted(sites)), warnings
 
 
-@step(
-    gives="facts", reads=("field", "skin", "surplus", "sheets", "pose", "aligner", "unit", "fitted", "adapted")
-)  # fmt: skip
-def gather_facts(state: JobState) -> ScanFacts:
-    """Measures what the whole scan says about skin that deviates and is not damaged."""
-    aligner, pose = state.aligner, state.pose
-    is_fitted = aligner is not None and aligner.gives_fitted_pose and not pose.is_held
-    facts = gather_scan_facts(state.field, state.skin, state.surplus, state.sheets, pose, is_fitted, state.unit)
-    fitted, adapted = state.fitted, state.adapted
-    fit = None if fitted is None else fitted.fit
-    return replace(facts, fit=fit, adapted=0.0 if adapted is None else adapted.amount)
-
-
-@step(gives="found", reads=("found", "accept", "rules", "terms", "facts", *JUDGED_BY))
+@step(gives="found", reads=("found", "accept", "rules", "terms", "errors", *JUDGED_BY))
 def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
     """Gives each site its verdict, and takes as damage those that the job accepts."""
     accept = state.accept
@@ -83,7 +69,9 @@ def judge_sites(state: JobState) -> tuple[FoundSite, ...]:
         _check_numbers("accept", accept, state.found)
     done = []
     each = _gather_all_facts(state)
-    for site, facts, reasons in zip(state.found, each, apply_to_sites(state.rules, each, state.facts), strict=True):
+    for site, facts, reasons in zip(
+        state.found, each, apply_to_sites(state.rules, each, state.errors.facts), strict=True
+    ):
         interval = open_end(facts.interval, reasons)
         verdict = decide(facts.volume, interval, reasons, facts.uncertainty.certain if facts.uncertainty else 0.0)
         uncertainty = replace(site.uncertainty, volume_95=interval) if site.uncertainty else None
@@ -108,7 +96,7 @@ def _gather_all_facts(state: JobState) -> list[SiteFacts]:
     """The facts of each site, with what the others say about it."""
     held = bool(state.found) and _is_held_by_datums(state)
     each = [_gather_site_facts(state, site, held) for site in state.found]
-    return compare_sites(state.rules, each, state.facts)
+    return compare_sites(state.rules, each, state.errors.facts)
 
 
 def _is_held_by_datums(state: JobState) -> bool:
@@ -150,7 +138,9 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         other_volume=site.other_volume,
         terms=state.terms,
     )
-    case = SiteCase(site.damage, members, field, state.facts, state.skin, state.coverage, state.pose, state.views, held)
+    case = SiteCase(
+        site.damage, members, field, state.errors.facts, state.skin, state.coverage, state.pose, state.views, held
+    )
     return measure_facts(state.rules, case, facts)
 
 

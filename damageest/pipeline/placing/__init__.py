@@ -6,7 +6,7 @@
 # form.py: steps about parts and scans that one rigid pose does not explain
 # large_scans.py: scans of which the reader gives only some points
 # prepare.py: steps between reading the inputs and finding damage
-# scanner.py: steps about what the job says of the scanner and of the part's temperature
+# temperature.py: the step about the temperature of the part
 # selections.py: checks what a job says of the part's skin and CAD faces as soon as the part is read
 # shared.py: what can be compared, where an earlier scan stands for the part
 # shared_table.py: whether an earlier and a later scan were laid on each other by a table that both show
