@@ -140,9 +140,11 @@ def diagnose_scale(
     if best is None:
         best = _find_two_units(ratio, here)
     if best is None:
+        crop = "crop the scan to the part"
+        piece = "where only a piece of the part was scanned, give the pose: align: none or align: icp"
         return (
             f"the scan's size is {apart}, and no wrong unit explains it; "
-            "check that the scan is of this part, and crop the scan to the part"
+            f"check that the scan is of this part; {piece if ratio < 1 else crop}"
         )
     return (
         f"the scan's size is {apart}: one of the two was probably read in the wrong unit, which makes it "

@@ -105,6 +105,15 @@ def test_sizes_that_no_unit_explains_are_said_not_to_fit():
     said = diagnose_scale(scanned("block") * 3.6, PARTS["block"].vertices)
     assert said is not None
     assert "no wrong unit explains" in said
+    assert "crop the scan" in said
+
+
+def test_a_piece_of_the_part_needs_its_pose():
+    points = scanned("block") / 3.9
+    said = diagnose_scale(points, PARTS["block"].vertices)
+    assert said is not None
+    assert "no wrong unit explains" in said
+    assert said.endswith("only a piece of the part was scanned, give the pose: align: none or align: icp")
 
 
 @pytest.mark.parametrize(("scan", "part"), [("cm", "m"), ("m", "cm"), ("cm", "mm"), ("mm", "cm"), ("m", "mm")])

@@ -79,7 +79,8 @@ def run_draw(draw: Draw, row: Row) -> Row:
         judged = describe_judgement(judge_error(message))
         return row | {name: judged[name] for name in ("outcome", "reason", "refused")} | {"error": message[:300]}
     row["seconds"] = time.perf_counter() - start
-    judged = describe_judgement(judge(result, TrueState(draw.part, draw.damage, draw.pose, draw.tolerance)))
+    pose = draw.pose if draw.rigid else result.pose.T_part_scan
+    judged = describe_judgement(judge(result, TrueState(draw.part, draw.damage, pose, draw.tolerance)))
     row |= {name: judged[name] for name in ("outcome", "reason", "cautious", "refused")}
     return row | _describe(result, draw, row["outcome"])
 

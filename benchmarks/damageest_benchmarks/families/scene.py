@@ -17,6 +17,7 @@ class Draw:
 
     ``depth``: the true depth in mm, NaN where it is not known. ``shown``: whether the scanner saw the damage with its
     rim as a whole, so that a result is wanted. ``settings`` of the job; ``said``: what was drawn, for the table.
+    ``rigid``: whether one pose is right for the whole scan; where it is not, the found one is judged by the damage.
     """
 
     part: Part
@@ -28,6 +29,7 @@ class Draw:
     shown: bool = True
     settings: tuple[str, ...] = ()
     said: Mapping[str, str | float] = field(default_factory=dict)
+    rigid: bool = True
 
 
 def draw_motion(rng: np.random.Generator, size: float) -> Floats:

@@ -65,13 +65,14 @@ class Bench:
         return points + self.rng.normal(scale=noise * self.noise, size=points.shape)
 
     def finish(
-        self, points: Floats, normals: Floats | None = None, *, after: Moved | None = None, settings: Sequence[str] = ()
+        self, points: Floats, normals: Floats | None = None, *, after: Moved | None = None, rigid: bool = True
     ) -> Draw:
-        """A scan of these points in a random pose; ``after`` changes them in the scanner's frame."""
+        """A scan of these points in a random pose; ``after`` changes them in the scanner's frame. ``rigid``: whether
+        one pose is right for all of them."""
         scan, pose = move_out(Scan(points, normals, unit="mm"), draw_motion(self.rng, self.part.diagonal))
         if after is not None:
             scan = replace(scan, points=after(scan.points))
-        return Draw(self.part, scan, self.damage, pose, self.tolerance, settings=tuple(settings))
+        return Draw(self.part, scan, self.damage, pose, self.tolerance, rigid=rigid)
 
     def finish_mesh(self, mesh: Mesh, after: Moved | None = None) -> Draw:
         """A scan that a program saved as a mesh."""

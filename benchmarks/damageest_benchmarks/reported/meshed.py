@@ -120,7 +120,7 @@ def staircase_of_labels() -> Draw:
 def wrong_distance_of_slices() -> Draw:
     """The slices lie 2 % farther apart than the file says: one axis is stretched."""
     bench = take("block", 28)
-    return bench.finish(bench.scan()[0], after=lambda at: at * np.array([1.0, 1.0, 1.02]))
+    return bench.finish(bench.scan()[0], after=lambda at: at * np.array([1.0, 1.0, 1.02]), rigid=False)
 
 
 def window_closed_by_a_web() -> Draw:

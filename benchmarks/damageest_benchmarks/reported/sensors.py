@@ -17,7 +17,7 @@ def two_lasers_two_sizes() -> Draw:
     bench = take("block", 40)
     points = bench.scan()[0]
     larger = np.arange(len(points)) % 2 == 0
-    return bench.finish(points * np.where(larger, 1.008, 1.0)[:, None])
+    return bench.finish(points * np.where(larger, 1.008, 1.0)[:, None], rigid=False)
 
 
 def _turn_about_z(points: Floats, angle: Floats) -> Floats:
@@ -31,7 +31,7 @@ def table_turns_less_than_told() -> Draw:
     bench = take("block", 41)
     points = bench.scan()[0]
     turn = np.arctan2(points[:, 1], points[:, 0]) + np.pi
-    return bench.finish(_turn_about_z(points, 0.02 * turn))
+    return bench.finish(_turn_about_z(points, 0.02 * turn), rigid=False)
 
 
 def drift_round_the_part() -> Draw:
@@ -40,7 +40,7 @@ def drift_round_the_part() -> Draw:
     points = bench.scan()[0]
     turn = (np.arctan2(points[:, 1], points[:, 0]) + np.pi) / (2 * np.pi)
     points[:, 2] += 4 * bench.tolerance * turn
-    return bench.finish(points)
+    return bench.finish(points, rigid=False)
 
 
 def planes_as_bowls() -> Draw:
@@ -52,7 +52,7 @@ def planes_as_bowls() -> Draw:
     axis = normalise(middle - scanners)[view]
     off = 1 - np.einsum("ij,ij->i", ray, axis)
     amount = off / np.quantile(off, 0.95) - 0.5
-    return bench.finish(points + 3 * bench.tolerance * amount[:, None] * ray)
+    return bench.finish(points + 3 * bench.tolerance * amount[:, None] * ray, rigid=False)
 
 
 def mirrored_below_the_floor() -> Draw:
