@@ -1,4 +1,4 @@
-"""Tries what plugins bring beside their stages on small examples: rules, formats of solids and of paths, documents."""
+"""Tries what plugins bring beside stages on small examples: rules, terms, formats of solids and paths, documents."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ WORKER = "damageest doctor"
 
 
 def try_plugins(registry: Registry, result: Result | None = None, apart: bool = False) -> tuple[int, list[str]]:
-    """How many rules and formats of plugins were tried, and what goes wrong with them. ``result``: of a small run, for
+    """How many rules, terms and formats of plugins were tried, and what goes wrong. ``result``: of a small run, for
     formats that hold a result as a whole; without it they are left out. ``apart``: in a process of its own, which a
     plugin may crash or hang."""
     trials = list_trials(registry, with_result=result is not None)
@@ -34,9 +34,10 @@ def try_plugins(registry: Registry, result: Result | None = None, apart: bool = 
 def list_trials(registry: Registry, with_result: bool = True) -> list[tuple[str, str, str]]:
     """What can be tried: its kind, its code or name, and what to call it."""
     from damageest.registry.guards import name_guarded
-    from damageest.trust.verdict import name_rule
+    from damageest.trust.verdict import name_told
 
-    trials = [("rule", rule.code, name_rule(rule)) for rule in registry.rules if rule.owner]
+    trials = [("rule", rule.code, name_told(rule)) for rule in registry.rules if rule.owner]
+    trials += [("term", term.name, name_told(term)) for term in registry.terms if term.owner]
     for name, writer in registry.writers.items():
         if (called := name_guarded(writer.write)) and (with_result or not writer.document):
             trials.append(("format", name, called))
@@ -59,13 +60,13 @@ def _try_apart(kind: str, name: str, called: str, kept: str) -> list[str]:
 
 
 def try_one(kind: str, name: str, kept: str, registry: Registry | None = None) -> list[str]:
-    """What goes wrong with a rule or a format, called on a small example. ``kept``: the folder of a saved result."""
+    """What goes wrong with a rule, a term or a format on a small example. ``kept``: the folder of a saved result."""
     from damageest.errors import DamageestError
     from damageest.registry import Registry
 
     registry = registry or Registry.discover()
-    if kind == "rule":
-        return _try_rule(registry, name)
+    if kind in ("rule", "term"):
+        return _try_rule(registry, name) if kind == "rule" else _try_term(registry, name)
     with TemporaryDirectory(prefix="damageest-") as folder:
         try:
             if kind == "path":
@@ -79,15 +80,28 @@ def try_one(kind: str, name: str, kept: str, registry: Registry | None = None) -
 
 
 def _try_rule(registry: Registry, code: str) -> list[str]:
-    from damageest.artefacts import Evidence
-    from damageest.rules import RULE_FAILED, ScanFacts, SiteFacts
-    from damageest.trust.verdict import apply_foreign_rule
+    from damageest.rules import RULE_FAILED
+    from damageest.trust.example import make_site
+    from damageest.trust.verdict import apply_rules, compare_sites, measure_facts
 
-    (rule,) = [rule for rule in registry.rules if rule.code == code]
-    site = SiteFacts(100.0, 40.0, 120.0, 200, 1.0, 2.0, Evidence(), (95.0, 105.0))
-    scan = ScanFacts(0.2, 0.3, "mm", noise=0.03, seen_area=2000.0)
-    reasons = apply_foreign_rule(rule, site, scan)
+    own = [rule for rule in registry.rules if rule.code == code]
+    facts, case, _ = make_site()
+    (facts,) = compare_sites(own, [measure_facts(own, case, facts)], case.scan)
+    reasons = apply_rules(own, facts, case.scan)
     return [f"{one.text}; try: {one.remedy}" for one in reasons if one.code == RULE_FAILED]
+
+
+def _try_term(registry: Registry, name: str) -> list[str]:
+    from damageest.errors import StageError
+    from damageest.trust.example import make_site
+    from damageest.trust.interval.uncertainty import measure_term
+
+    (term,) = [term for term in registry.terms if term.name == name]
+    try:
+        measure_term(term, make_site()[2])
+    except StageError as error:
+        return [f"{error.message}; try: {error.remedy}"]
+    return []
 
 
 def _try_writer(writer: Writer, name: str, folder: Path, kept: str) -> None:

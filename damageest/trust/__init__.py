@@ -11,5 +11,6 @@
 # model_fit.py: does the part as designed explain the skin
 # fit_doubts.py: conditions of "the part as designed explains the skin"
 # table.py: the classes of a room
+# example.py: a small site for trying rules and terms
 # doubt.py: what a doubt is, and the facts it sees
 # verdict.py: what rules measure and say; the criterion

@@ -13,6 +13,7 @@ from damageest.findings import Interval, Level, Verdict
 from damageest.isolation import at_work
 from damageest.trust.doubt import RULE_FAILED, Rule, ScanFacts, SiteCase, SiteFacts
 from damageest.trust.doubts.nothing import is_nothing
+from damageest.trust.interval.site_error import Term
 
 NARROW = 0.05
 """Half-width of the interval, as a share of the volume, up to which a site is proven."""
@@ -105,15 +106,16 @@ def _ask_foreign(rule: Rule, ask: Callable[[], T]) -> T | Reason:
         return _describe_failed(rule, f"failed: {type(error).__name__}: {clean_message(error, 400)}")
 
 
-def name_rule(rule: Rule) -> str:
-    """What a rule of a plugin is called in messages."""
-    return f"the rule {type(rule).__qualname__} ('{rule.code}') of {rule.owner}"
+def name_told(told: Rule | Term) -> str:
+    """What a rule or a term of a plugin is called in messages."""
+    what, name = ("rule", told.code) if isinstance(told, Rule) else ("term", told.name)
+    return f"the {what} {type(told).__qualname__} ('{name}') of {told.owner}"
 
 
 def _describe_failed(rule: Rule, why: str) -> Reason:
     return Reason(
         RULE_FAILED,
-        f"a check could not be made: {name_rule(rule)} {why}",
+        f"a check could not be made: {name_told(rule)} {why}",
         "contradicts",
         remedy=f"report it to the authors of {rule.owner}, or uninstall it",
     )

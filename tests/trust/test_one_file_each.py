@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 import damageest
 from damageest.artefacts import Evidence
 from damageest.cli import app
+from damageest.cli._trials import try_plugins
 from damageest.errors import StageError
 from damageest.registry import Registry
 from damageest.result import Result
@@ -106,6 +107,17 @@ def test_both_are_explained(site: Site) -> None:
     tables = call(app, ["schema", "reasons"]).output
     assert "| `acme_tall` | the site is taller than the gauge | a height of 0.1 mm | take the large gauge |" in tables
     assert "| `acme_coating` | thickness of the coating of the scan | weigh the coating |" in tables
+
+
+def test_doctor_tries_both_and_says_what_fails(site: Site) -> None:
+    site.add("acme-tall", DOUBT)
+    site.add("acme-coating", TERM.replace("source=0.5", "surce=0.5"))
+    count, faults = try_plugins(Registry.discover())
+    assert count >= 2
+    own = [fault for fault in faults if "acme" in fault]
+    assert [fault[: fault.index(" failed")] for fault in own] == [
+        "the term Coating ('acme_coating') of acme-coating 1.2"
+    ]
 
 
 @pytest.mark.parametrize(
