@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
-
-import numpy as np
+from typing import Annotated
 
 from damageest.artefacts.arrays import Floats
 from damageest.artefacts.displacement import DisplacementField
-from damageest.artefacts.fields import MOST, Checked, Range, require_finite, require_shape
+from damageest.artefacts.fields import Checked, Count, NotNegative, Shape, Share, Span, require_shape
 from damageest.artefacts.meshes import Part
 from damageest.artefacts.poses import require_rigid
 
@@ -18,11 +16,10 @@ from damageest.artefacts.poses import require_rigid
 class PriorUse(Checked):
     """Prediction by other parts of the type; ``misfit`` is along the normals."""
 
-    parts: int
-    misfit: Annotated[float, "root mean square residual of their forms on seen skin"]
-    limit: Annotated[float, "largest misfit of a part of the type"]
+    parts: Annotated[int, Span(1)]
+    misfit: Annotated[NotNegative, "root mean square residual of their forms on seen skin"]
+    limit: Annotated[NotNegative, "largest misfit of a part of the type"]
     is_used: Annotated[bool, "whether they predicted lost skin; false: this part deforms in another way"]
-    _ranges: ClassVar[dict[str, Range]] = {"parts": (1, MOST), "misfit": (0.0, MOST), "limit": (0.0, MOST)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,70 +40,35 @@ class AdaptedPart(Checked):
     """
 
     part: Part
-    displacement: Floats
-    motion: Annotated[Floats, "4x4, the rigid motion beside the deformation, contained in alignment.transform"]
-    modes: Floats
-    amount: Annotated[float, "largest displacement of the seen intact skin, without a rigid motion"]
-    rms: Annotated[float, "root mean square displacement of the same skin"]
-    growth: Annotated[float, "uniform scale of the displacement, less 1"] = 0.0
-    strain: Annotated[float, "largest strain of the metal beyond uniform scale, without unit"] = 0.0
+    displacement: Annotated[Floats, Shape("V", 3)]
+    motion: Annotated[
+        Floats, Shape(4, 4), "4x4, the rigid motion beside the deformation, contained in alignment.transform"
+    ]
+    modes: Annotated[Floats, Shape("K", "V", 3)]
+    amount: Annotated[NotNegative, "largest displacement of the seen intact skin, without a rigid motion"]
+    rms: Annotated[NotNegative, "root mean square displacement of the same skin"]
+    growth: Annotated[float, Span(-0.5, 1.0), "uniform scale of the displacement, less 1"] = 0.0
+    strain: Annotated[NotNegative, "largest strain of the metal beyond uniform scale, without unit"] = 0.0
     lattice: Annotated[tuple[int, int, int], "cells along the axes; 0, 0, 0: a cubic polynomial"] = (0, 0, 0)
-    functions: Annotated[int, "number of smooth functions for each coordinate of the displacement"] = 0
-    gain: Annotated[float, "relative gain in the fit of held-out patches, against a rigid part"] = 0.0
+    functions: Annotated[Count, "number of smooth functions for each coordinate of the displacement"] = 0
+    gain: Annotated[Share, "relative gain in the fit of held-out patches, against a rigid part"] = 0.0
     notes: tuple[str, ...] = ()
-    other: Floats | None = None
+    other: Annotated[Floats | None, Shape("V", 3)] = None
     field: DisplacementField | None = None
-    hidden: float = 0.0
-    held_out: tuple[float, float] = (0.0, 0.0)
-    patches: int = 0
-    seen: Floats | None = None
-    reach: float = 0.0
-    left: Floats | None = None
+    hidden: NotNegative = 0.0
+    held_out: Annotated[tuple[float, float], Span(0.0)] = (0.0, 0.0)
+    patches: Count = 0
+    seen: Annotated[Floats | None, Shape("S", 3)] = None
+    reach: NotNegative = 0.0
+    left: Annotated[Floats | None, Shape("S")] = None
     prior: Annotated[PriorUse | None, "null where no other parts of the type were given"] = None
     designed: tuple[str, ...] = ()
-    unfollowed: float = 0.0
-    lowered: Floats | None = None
-    _dtypes: ClassVar[dict[str, Any]] = {
-        "displacement": np.float64,
-        "motion": np.float64,
-        "modes": np.float64,
-        "other": np.float64,
-        "seen": np.float64,
-        "left": np.float64,
-        "lowered": np.float64,
-    }
-    _ranges: ClassVar[dict[str, Range]] = {
-        "amount": (0.0, MOST),
-        "rms": (0.0, MOST),
-        "strain": (0.0, MOST),
-        "growth": (-0.5, 1.0),
-        "functions": (0, MOST),
-        "gain": (0.0, 1.0),
-        "hidden": (0.0, MOST),
-        "held_out": (0.0, MOST),
-        "patches": (0, MOST),
-        "reach": (0.0, MOST),
-        "unfollowed": (0.0, MOST),
-    }
+    unfollowed: NotNegative = 0.0
+    lowered: Annotated[Floats | None, Shape("V")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        count = len(self.part.vertices)
-        require_shape("displacement", self.displacement, count, 3)
-        require_finite("displacement", self.displacement)
-        require_shape("modes", self.modes, "K", count, 3)
-        require_finite("modes", self.modes)
-        if self.other is not None:
-            require_shape("other", self.other, count, 3)
-            require_finite("other", self.other)
-        if self.seen is not None:
-            require_shape("seen", self.seen, "S", 3)
-            require_finite("seen", self.seen)
-        if self.left is not None:
-            require_shape("left", self.left, 0 if self.seen is None else len(self.seen))
-            require_finite("left", self.left)
-        if self.lowered is not None:
-            require_shape("lowered", self.lowered, count)
-            require_finite("lowered", self.lowered)
-        require_shape("motion", self.motion, 4, 4)
+        require_shape("displacement", self.displacement, len(self.part.vertices), 3)
+        if self.left is not None and self.seen is None:
+            require_shape("left", self.left, 0)
         require_rigid("motion", self.motion)

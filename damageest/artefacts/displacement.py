@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from damageest.artefacts.arrays import Floats
-from damageest.artefacts.fields import ArtefactError, Checked, require_finite, require_shape
+from damageest.artefacts.fields import ArtefactError, Checked, Shape
 
 DEGREE = 3
 
@@ -23,18 +23,12 @@ class DisplacementField(Checked):
     Outside the box the outermost cells go on.
     """
 
-    low: Floats
-    high: Floats
-    controls: Floats
-    _dtypes: ClassVar[dict[str, Any]] = {"low": np.float64, "high": np.float64, "controls": np.float64}
+    low: Annotated[Floats, Shape(3)]
+    high: Annotated[Floats, Shape(3)]
+    controls: Annotated[Floats, Shape("I", "J", "K", 3)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("low", self.low, 3)
-        require_shape("high", self.high, 3)
-        require_shape("controls", self.controls, "I", "J", "K", 3)
-        for name in ("low", "high", "controls"):
-            require_finite(name, getattr(self, name))
         if not (self.high > self.low).all():
             raise ArtefactError("high: not above low along each axis")
         if min(self.controls.shape[:3]) <= DEGREE:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 
 from damageest.artefacts.arrays import Ints
-from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, make_array, require_shape
+from damageest.artefacts.fields import ArtefactError, Checked, make_array, require_shape
 from damageest.artefacts.meshes import Solid
 
 EvidenceCause = Literal["residual", "inside", "contradicted", "bare", "shallow", "unseen"]
@@ -37,7 +37,6 @@ class Enclosure(Checked):
     solid: Solid
     sites: tuple[int, ...]
     notes: tuple[str, ...] = ()
-    _ranges: ClassVar[dict[str, Range]] = {"sites": (1, MOST)}
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -9,7 +9,7 @@ import typing
 from collections.abc import Mapping
 from functools import cache
 from numbers import Integral, Real
-from typing import Any, ClassVar
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,6 @@ from damageest.errors import clean_message
 
 MOST = sys.float_info.max
 """The largest finite number."""
-Range = tuple[float, float]
 TEXTS = ("notes", "doubts", "warnings", "text", "why")
 """Names of fields with text that is shown to people, and may be a plugin's."""
 
@@ -27,29 +26,61 @@ class ArtefactError(ValueError):
     """The data do not fit the artefact's type: wrong shapes, indices out of range, a solid that is not closed."""
 
 
+class Span(NamedTuple):
+    """The range of a number, or of each number of a tuple, in its ``Annotated``; both ends are in it."""
+
+    low: float = -MOST
+    high: float = MOST
+
+
+class Shape:
+    """The shape of an array, in its ``Annotated``: lengths, and letters for any length, each the same in all fields of
+    a value. ``finite``: whether infinite numbers and NaN are refused."""
+
+    def __init__(self, *lengths: int | str, finite: bool = True) -> None:
+        self.lengths, self.finite = lengths, finite
+
+
+NotNegative = Annotated[float, Span(0.0)]
+Share = Annotated[float, Span(0.0, 1.0)]
+Count = Annotated[int, Span(0)]
+
+
+class _Field(NamedTuple):
+    hint: Any
+    dtype: Any
+    span: Span
+    shape: Shape | None
+
+
 class Checked:
     """Checks the fields of a dataclass against their annotations when it is made, and raises ArtefactError.
 
-    Numbers are finite unless ``_ranges`` gives a range for the field, both ends included; numbers of NumPy become
-    Python's, lists become tuples, and texts in the fields of `TEXTS` are cleaned. ``_dtypes``: fields that are arrays,
-    which become read-only arrays of that type; a number that the type cannot hold is an error.
+    Numbers are finite, or in the `Span` of the field's ``Annotated``; numbers of NumPy become Python's, lists become
+    tuples, and texts in the fields of `TEXTS` are cleaned. Arrays become read-only arrays of the annotation's type, and
+    have the `Shape` of their ``Annotated``; a number that the type cannot hold is an error.
     """
-
-    _dtypes: ClassVar[dict[str, Any]] = {}
-    _ranges: ClassVar[dict[str, Range]] = {}
 
     def __post_init__(self) -> None:
         cls: Any = type(self)
-        for name, hint in _read_fields(cls).items():
+        fields = _read_fields(cls)
+        for name, (hint, dtype, span, _) in fields.items():
             value = getattr(self, name)
-            if name not in self._dtypes:
-                checked = _check_value(value, hint, name, self._ranges.get(name, (-MOST, MOST)))
+            if dtype is None:
+                checked = _check_value(value, hint, name, span)
             elif value is None and type(None) in typing.get_args(hint):
                 continue
             else:
-                checked = make_array(value, self._dtypes[name], name)
+                checked = make_array(value, dtype, name)
             if checked is not value:
                 object.__setattr__(self, name, checked)
+        known: dict[int | str, int] = {}
+        for name, (_, _, _, shape) in fields.items():
+            if shape is not None and (array := getattr(self, name)) is not None:
+                require_shape(name, array, *(known.get(length, length) for length in shape.lengths))
+                known |= zip(shape.lengths, array.shape, strict=True)
+                if shape.finite and array.dtype.kind == "f":
+                    require_finite(name, array)
 
 
 def make_array(value: Any, dtype: Any, name: str) -> NDArray[Any]:
@@ -94,13 +125,28 @@ def require_index(name: str, array: NDArray[Any], count: int, of: str, least: in
 
 
 @cache
-def _read_fields(cls: Any) -> Mapping[str, Any]:
-    """Name and type of each field of a dataclass."""
-    hints = typing.get_type_hints(cls)
-    return {field.name: hints[field.name] for field in dataclasses.fields(cls) if field.init}
+def _read_fields(cls: Any) -> Mapping[str, _Field]:
+    """What each field of a dataclass is, by its name."""
+    hints, whole = typing.get_type_hints(cls), typing.get_type_hints(cls, include_extras=True)
+    found = {}
+    for name in (field.name for field in dataclasses.fields(cls) if field.init):
+        notes = getattr(whole[name], "__metadata__", ())
+        span = next((note for note in notes if isinstance(note, Span)), Span())
+        shape = next((note for note in notes if isinstance(note, Shape)), None)
+        found[name] = _Field(hints[name], _find_dtype(hints[name]), span, shape)
+    return found
 
 
-def _check_value(value: Any, hint: Any, name: str, span: Range) -> Any:
+def _find_dtype(hint: Any) -> Any:
+    """The type of an array's numbers; None for what is no array."""
+    if typing.get_origin(hint) is np.ndarray:
+        (dtype,) = typing.get_args(typing.get_args(hint)[1])
+        return dtype
+    is_union = isinstance(hint, types.UnionType) or typing.get_origin(hint) is typing.Union
+    return next((dtype for one in typing.get_args(hint) if (dtype := _find_dtype(one))), None) if is_union else None
+
+
+def _check_value(value: Any, hint: Any, name: str, span: Span) -> Any:
     """The value, as a Python type. Raises ArtefactError where it is not of the type ``hint``, or outside ``span``."""
     outer, inner = typing.get_origin(hint), typing.get_args(hint)
     if outer in (typing.Union, types.UnionType):
@@ -121,19 +167,19 @@ def _check_value(value: Any, hint: Any, name: str, span: Range) -> Any:
     return bool(value) if hint is bool else value
 
 
-def _check_number(value: Any, hint: type, name: str, span: Range) -> Any:
+def _check_number(value: Any, hint: type, name: str, span: Span) -> Any:
     is_number = isinstance(value, Integral if hint is int else Real) and not isinstance(value, (bool, np.bool_))
     if not is_number:
         raise ArtefactError(f"{name}: expected {_name_hint(hint)}, got {_name_type(value)}")
     if not span[0] <= value <= span[1]:  # not for one that is no number, either
         low, high = (f"{end:g}" for end in span)
-        wanted = "a finite number" if span == (-MOST, MOST) else f"a number of at least {low}"
+        wanted = "a finite number" if span == Span() else f"a number of at least {low}"
         wanted = wanted if span[1] >= MOST else f"a number from {low} to {high}"
         raise ArtefactError(f"{name}: expected {wanted}, got {value}")
     return value if type(value) is hint else hint(value)
 
 
-def _check_tuple(value: Any, inner: tuple[Any, ...], name: str, span: Range) -> Any:
+def _check_tuple(value: Any, inner: tuple[Any, ...], name: str, span: Span) -> Any:
     if not isinstance(value, (tuple, list)):
         raise ArtefactError(f"{name}: expected a tuple, got {_name_type(value)}")
     hints = [inner[0]] * len(value) if inner[1:] == (Ellipsis,) else list(inner)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from damageest.artefacts.arrays import Flags, Floats, Ints
-from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
+from damageest.artefacts.fields import ArtefactError, Checked, NotNegative, Shape, Span, require_index
 
 ROUNDING = 1e-9
 """Relative error by which a mean of equal numbers may leave them."""
@@ -19,16 +19,12 @@ ROUNDING = 1e-9
 class Mesh(Checked):
     """A triangle mesh: ``vertices`` (V,3) float64, ``faces`` (F,3) int64, counter-clockwise from outside."""
 
-    vertices: Floats
-    faces: Ints
-    _dtypes: ClassVar[dict[str, Any]] = {"vertices": np.float64, "faces": np.int64}
+    vertices: Annotated[Floats, Shape("V", 3)]
+    faces: Annotated[Ints, Shape("F", 3)]
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("vertices", self.vertices, "V", 3)
-        require_shape("faces", self.faces, "F", 3)
         require_index("faces", self.faces, len(self.vertices), "vertices")
-        require_finite("vertices", self.vertices)
 
     @property
     def triangles(self) -> Floats:
@@ -149,22 +145,19 @@ class Deposit(Solid):
     """
 
     cavity: Solid | None = None
-    stock_volume: Annotated[float, "volume of the deposit beyond the nominal surface, to be milled off"] = 0.0
+    stock_volume: Annotated[NotNegative, "volume of the deposit beyond the nominal surface, to be milled off"] = 0.0
     cut_back_volume: Annotated[
-        float, "volume of intact metal to remove before, for a clean surface or an open cavity"
+        NotNegative, "volume of intact metal to remove before, for a clean surface or an open cavity"
     ] = 0.0
     thickness: Annotated[
-        tuple[float, float, float] | None, "thickness of the stock; null: no stock, or not measured"
+        tuple[float, float, float] | None, Span(0.0), "thickness of the stock; null: no stock, or not measured"
     ] = None
     touched: tuple[int, ...] = ()
     heights: tuple[tuple[int, float], ...] = ()
-    overlap: float = 0.0
+    overlap: NotNegative = 0.0
     notes: tuple[str, ...] = ()
     milled: Solid | None = None
     opening: Solid | None = None
-    _ranges: ClassVar[dict[str, Range]] = dict.fromkeys(
-        ("stock_volume", "cut_back_volume", "thickness", "overlap"), (0.0, MOST)
-    )
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -194,26 +187,19 @@ class Part(Solid):
     unit: str = "mm"
     path: str = ""
     sha256: str = ""
-    faces_brep: Ints | None = None
+    faces_brep: Annotated[Ints | None, Shape("F")] = None
     face_names: tuple[str, ...] = ()
     face_kinds: tuple[str, ...] = ()
-    tessellation_error: Annotated[float, "bound on the distance between CAD surface and triangles"] = 0.0
+    tessellation_error: Annotated[NotNegative, "bound on the distance between CAD surface and triangles"] = 0.0
     notes: Annotated[tuple[str, ...], "repairs and conversions at reading"] = ()
-    cad_scale: float = 0.0
-    unseen: Flags | None = None
-    scan_noise: float = 0.0
-    scan_spacing: float = 0.0
-    _dtypes: ClassVar[dict[str, Any]] = {**Mesh._dtypes, "faces_brep": np.int64, "unseen": np.bool_}
-    _ranges: ClassVar[dict[str, Range]] = dict.fromkeys(
-        ("tessellation_error", "cad_scale", "scan_noise", "scan_spacing"), (0.0, MOST)
-    )
+    cad_scale: NotNegative = 0.0
+    unseen: Annotated[Flags | None, Shape("F")] = None
+    scan_noise: NotNegative = 0.0
+    scan_spacing: NotNegative = 0.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.faces_brep is not None:
-            require_shape("faces_brep", self.faces_brep, len(self.faces))
             for name in ("face_names", "face_kinds"):
                 if known := getattr(self, name):
                     require_index("faces_brep", self.faces_brep, len(known), name)
-        if self.unseen is not None:
-            require_shape("unseen", self.unseen, len(self.faces))

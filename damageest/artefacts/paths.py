@@ -4,22 +4,23 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from damageest.artefacts.arrays import Flags, Floats, Ints
-from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_shape
+from damageest.artefacts.fields import ArtefactError, Checked, NotNegative, Shape, Span, require_shape
 from damageest.artefacts.meshes import Mesh, Solid
+
+_OPEN = Span(high=np.inf)
 
 
 @dataclass(frozen=True)
 class Unreached(Checked):
     """Deposit that no pass fills: its ``volume`` and ``why``."""
 
-    volume: float
+    volume: NotNegative
     why: str
-    _ranges: ClassVar[dict[str, Range]] = {"volume": (0.0, MOST)}
 
 
 @dataclass(frozen=True)
@@ -65,28 +66,29 @@ class DepositPath(Checked):
     as its settings make it; None: ``width`` and ``heights``, with which the path was planned.
     """
 
-    points: Floats
-    axes: Floats
-    normals: Floats
-    feed: Floats
-    on: Flags
-    layer: Ints
-    number: Ints
-    part: Ints
-    directions: Floats
-    heights: Floats
-    width: float
-    section: Floats
-    standoff: float
-    deposit_volume: float
+    points: Annotated[Floats, Shape("N", 3)]
+    axes: Annotated[Floats, Shape("N", 3)]
+    normals: Annotated[Floats, Shape("N", 3)]
+    feed: Annotated[Floats, Shape("N")]
+    on: Annotated[Flags, Shape("N")]
+    layer: Annotated[Ints, Shape("N")]
+    number: Annotated[Ints, Shape("N")]
+    part: Annotated[Ints, Shape("N")]
+    directions: Annotated[Floats, Shape("P", 3)]
+    heights: Annotated[Floats, Shape("P")]
+    width: NotNegative
+    section: Annotated[Floats, Shape("P")]
+    standoff: NotNegative
+    deposit_volume: NotNegative
     nozzle: Mesh
     clearance: Annotated[
         float,
+        _OPEN,
         "distance that the nozzle keeps at least from metal, earlier deposits, fixture and layers below "
         "during deposition; what is farther than the job asks for is not measured; null: none is near",
     ]
-    travel_clearance: Annotated[float, "the same between passes"]
-    tightest: Floats | None = None
+    travel_clearance: Annotated[float, _OPEN, "the same between passes"]
+    tightest: Annotated[Floats | None, Shape(2, 3, finite=False)] = None
     unreached: Annotated[tuple[Unreached, ...], "that volume by reason"] = ()
     missing: Solid | None = None
     fill: Annotated[BeadFill | None, "null where it was not simulated"] = None
@@ -94,64 +96,32 @@ class DepositPath(Checked):
     kinds: tuple[str, ...] = ()
     setup: Annotated[
         Floats | None,
+        Shape(4, 4),
         "with 3 axes: transform (4 rows) of a point of the part's frame to the frame in which the part is "
         "set up, z along the tool; the path's files are in that frame. Null: they are in the part's frame",
     ] = None
     channels: tuple[str, ...] = ()
-    values: Floats | None = None
+    values: Annotated[Floats | None, Shape("N", "C")] = None
     layer_form: Annotated[
         str,
         "planar: planes across the build direction; conformal: surfaces along the floor of the cavity; "
         "empty: not known",
     ] = ""
-    around: Floats | None = None
+    around: Annotated[Floats | None, Shape(4)] = None
     free_ends: Flags | None = None
-    dwell: Floats | None = None
-    bead_sizes: Floats | None = None
-    _dtypes: ClassVar[dict[str, Any]] = {
-        "points": np.float64, "axes": np.float64, "normals": np.float64, "feed": np.float64, "on": np.bool_,
-        "layer": np.int64, "number": np.int64, "part": np.int64, "directions": np.float64, "heights": np.float64,
-        "section": np.float64, "tightest": np.float64, "setup": np.float64, "values": np.float64,
-        "around": np.float64, "free_ends": np.bool_, "dwell": np.float64, "bead_sizes": np.float64,
-    }  # fmt: skip
-    _ranges: ClassVar[dict[str, Range]] = {
-        "width": (0.0, MOST), "standoff": (0.0, MOST), "deposit_volume": (0.0, MOST),
-        "clearance": (-MOST, np.inf), "travel_clearance": (-MOST, np.inf),
-    }  # fmt: skip
+    dwell: Annotated[Floats | None, Shape("N")] = None
+    bead_sizes: Annotated[Floats | None, Shape("N", 2)] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("points", self.points, "N", 3)
         count = len(self.points)
-        for name in ("points", "axes", "normals"):
-            require_shape(name, getattr(self, name), count, 3)
-            require_finite(name, getattr(self, name))
-        for name in ("feed", "on", "layer", "number", "part"):
-            require_shape(name, getattr(self, name), count)
-        require_shape("directions", self.directions, "P", 3)
-        for name in ("heights", "section"):
-            require_shape(name, getattr(self, name), len(self.directions))
-        for name in ("feed", "directions", "heights", "section"):
-            require_finite(name, getattr(self, name))
-        if self.tightest is not None:
-            require_shape("tightest", self.tightest, 2, 3)
-        if self.setup is not None:
-            require_shape("setup", self.setup, 4, 4)
-            require_finite("setup", self.setup)
-        if self.around is not None:
-            require_shape("around", self.around, 4)
-            require_finite("around", self.around)
         if (self.values is None) == bool(self.channels):
             raise ArtefactError("channels, values: one without the other")
         if self.values is not None:
             require_shape("values", self.values, count, len(self.channels))
-            require_finite("values", self.values)
-        for name, shape in (("dwell", (count,)), ("bead_sizes", (count, 2))):
-            if (own := getattr(self, name)) is not None:
-                require_shape(name, own, *shape)
-                require_finite(name, own)
-                if count and own.min() < 0:
-                    raise ArtefactError(f"{name}: not all 0 or more")
+        for name in ("dwell", "bead_sizes"):
+            if count and (own := getattr(self, name)) is not None and own.min() < 0:
+                raise ArtefactError(f"{name}: not all 0 or more")
         with np.errstate(over="ignore"):
             is_unit = np.allclose(np.linalg.norm(self.axes, axis=1), 1, atol=1e-6)
         if not is_unit:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from damageest.artefacts.arrays import Floats, Vector
-from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_shape
+from damageest.artefacts.fields import ArtefactError, Checked, Count, NotNegative, Shape, Share, require_finite
 from damageest.artefacts.reasons import Reason
 
 RIGID = 1e-6
@@ -63,19 +63,16 @@ class DatumFit(Checked):
     kind: Annotated[str, "shape, for example `plane`, or `3 cylinders` for a pattern"]
     faces: Annotated[tuple[int, ...], "numbers of its CAD faces; empty where the part is a mesh"] = ()
     takes: Annotated[tuple[str, ...], "degrees of freedom that it fixes beyond earlier datums"] = ()
-    points: Annotated[int, "scan points on it"] = 0
-    contact: Annotated[float, "share of them on the fitted shape"] = 1.0
-    inside: Annotated[float, "share of them below the fitted shape, for example by wear"] = 0.0
-    rms: Annotated[float, "root mean square distance of patches in contact from the fitted shape"] = 0.0
+    points: Annotated[Count, "scan points on it"] = 0
+    contact: Annotated[Share, "share of them on the fitted shape"] = 1.0
+    inside: Annotated[Share, "share of them below the fitted shape, for example by wear"] = 0.0
+    rms: Annotated[NotNegative, "root mean square distance of patches in contact from the fitted shape"] = 0.0
     nominal: Annotated[tuple[float, ...], "radius of each cylinder and sphere, as designed"] = ()
     measured: Annotated[tuple[float, ...], "radius of each as fitted to the scan"] = ()
     shapes: tuple[str, ...] = ()
     places: tuple[Vector, ...] = ()
     axes: tuple[Vector, ...] = ()
     bores: tuple[bool, ...] = ()
-    _ranges: ClassVar[dict[str, Range]] = {
-        "points": (0, MOST), "contact": (0.0, 1.0), "inside": (0.0, 1.0), "rms": (0.0, MOST),
-    }  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,27 +87,22 @@ class Pose(Checked):
     skin.
     """
 
-    T_part_scan: Floats
-    rms: Annotated[float, "root mean square distance of the inliers to the part"] = 0.0
-    inliers: Annotated[float, "share of the scan's points"] = 1.0
-    alternatives: Annotated[Floats | None, "other poses that fit as well, for example on a symmetric part"] = None
+    T_part_scan: Annotated[Floats, Shape(4, 4)]
+    rms: Annotated[NotNegative, "root mean square distance of the inliers to the part"] = 0.0
+    inliers: Annotated[Share, "share of the scan's points"] = 1.0
+    alternatives: Annotated[
+        Floats | None, Shape("K", 4, 4), "other poses that fit as well, for example on a symmetric part"
+    ] = None
     notes: tuple[str, ...] = ()
     doubts: Annotated[tuple[Reason, ...], "reasons against the pose, and so against every site"] = ()
     free: Annotated[tuple[FreeMotion, ...], "motions that no unworn skin fixes"] = ()
     is_held: Annotated[bool, "whether unworn skin fixes all other motions"] = False
     datums: Annotated[tuple[DatumFit, ...], "datums of a datum system, in the order of precedence; else empty"] = ()
     left: Annotated[tuple[FreeMotion, ...], "motions that the datum system leaves free, fixed by other skin"] = ()
-    spread: Floats | None = None
-    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64, "alternatives": np.float64, "spread": np.float64}
-    _ranges: ClassVar[dict[str, Range]] = {"rms": (0.0, MOST), "inliers": (0.0, 1.0)}
+    spread: Annotated[Floats | None, Shape(6, "E")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("T_part_scan", self.T_part_scan, 4, 4)
         require_rigid("T_part_scan", self.T_part_scan)
         if self.alternatives is not None:
-            require_shape("alternatives", self.alternatives, "K", 4, 4)
             require_rigid("alternatives", self.alternatives)
-        if self.spread is not None:
-            require_shape("spread", self.spread, 6, "K")
-            require_finite("spread", self.spread)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Annotated, Any, ClassVar, TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from damageest.artefacts.arrays import Bytes, Flags, Floats, Ints, Singles
-from damageest.artefacts.fields import MOST, ArtefactError, Checked, Range, require_finite, require_index, require_shape
+from damageest.artefacts.fields import ArtefactError, Checked, Count, NotNegative, Shape, require_index
 from damageest.artefacts.meshes import Solid
 from damageest.artefacts.poses import require_rigid
 from damageest.artefacts.reasons import Reason
@@ -40,14 +40,12 @@ class Truth(Checked):
     lies in a part that was deformed before it was scanned; None where it was not."""
 
     damage: Solid | None
-    T_part_scan: Floats
+    T_part_scan: Annotated[Floats, Shape(4, 4)]
     added: Solid | None = None
     deformed: Solid | None = None
-    _dtypes: ClassVar[dict[str, Any]] = {"T_part_scan": np.float64}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("T_part_scan", self.T_part_scan, 4, 4)
         require_rigid("T_part_scan", self.T_part_scan)
 
 
@@ -66,51 +64,30 @@ class Scan(Checked):
     ``columns``: which columns of text files are x, y and z, and why, where it is not plain.
     """
 
-    points: Floats
-    normals: Floats | None = None
+    points: Annotated[Floats, Shape("N", 3, finite=False)]
+    normals: Annotated[Floats | None, Shape("N", 3, finite=False)] = None
     unit: str = "mm"
     paths: tuple[str, ...] = ()
-    noise: Annotated[float, "measured standard deviation of the points off the local surface"] = 0.0
-    spacing: Annotated[float, "measured distance that a reconstructed surface has to bridge"] = 0.0
+    noise: Annotated[NotNegative, "measured standard deviation of the points off the local surface"] = 0.0
+    spacing: Annotated[NotNegative, "measured distance that a reconstructed surface has to bridge"] = 0.0
     truth: Truth | None = None
     notes: tuple[str, ...] = ()
-    viewpoints: Floats | None = None
-    view: NDArray[np.int32] | None = None
-    total: int = 0
-    colours: Bytes | None = None
-    confidence: Singles | None = None
+    viewpoints: Annotated[Floats | None, Shape("V", 3)] = None
+    view: Annotated[NDArray[np.int32] | None, Shape("N")] = None
+    total: Count = 0
+    colours: Annotated[Bytes | None, Shape("N", 3)] = None
+    confidence: Annotated[Singles | None, Shape("N", finite=False)] = None
     warnings: tuple[Reason, ...] = ()
-    cloud: NDArray[np.int32] | None = None
+    cloud: Annotated[NDArray[np.int32] | None, Shape("N")] = None
     columns: tuple[str, ...] = ()
-    _dtypes: ClassVar[dict[str, Any]] = {
-        "points": np.float64,
-        "normals": np.float64,
-        "viewpoints": np.float64,
-        "view": np.int32,
-        "colours": np.uint8,
-        "confidence": np.float32,
-        "cloud": np.int32,
-    }
-    _ranges: ClassVar[dict[str, Range]] = {"noise": (0.0, MOST), "spacing": (0.0, MOST), "total": (0, MOST)}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("points", self.points, "N", 3)
-        if self.normals is not None:
-            require_shape("normals", self.normals, len(self.points), 3)
-        if self.colours is not None:
-            require_shape("colours", self.colours, len(self.points), 3)
-        if self.confidence is not None:
-            require_shape("confidence", self.confidence, len(self.points))
         if (self.viewpoints is None) != (self.view is None):
             raise ArtefactError("viewpoints and view: give both or none")
         if self.viewpoints is not None and self.view is not None:
-            require_shape("viewpoints", self.viewpoints, "V", 3)
-            require_finite("viewpoints", self.viewpoints)
-            require_shape("view", self.view, len(self.points))
             require_index("view", self.view, len(self.viewpoints), "viewpoints", least=-1)
         if self.cloud is not None:
-            require_shape("cloud", self.cloud, len(self.points))
             require_index("cloud", self.cloud, MOST_CLOUDS, "clouds", least=-1)
 
     def move(self, T: Floats) -> Scan:
@@ -133,30 +110,16 @@ class Samples(Checked):
     ones on edges and corners), ``face`` (N,) the triangle, ``kind`` (N,): 0 on a face, 1 on a sharp edge, 2 on a
     corner. ``spacing`` is the largest intended gap."""
 
-    points: Floats
-    normals: Floats
-    face: Ints
-    kind: NDArray[np.uint8]
-    spacing: float
-    _dtypes: ClassVar[dict[str, Any]] = {
-        "points": np.float64,
-        "normals": np.float64,
-        "face": np.int64,
-        "kind": np.uint8,
-    }
-    _ranges: ClassVar[dict[str, Range]] = {"spacing": (0.0, MOST)}
+    points: Annotated[Floats, Shape("N", 3)]
+    normals: Annotated[Floats, Shape("N", 3)]
+    face: Annotated[Ints, Shape("N")]
+    kind: Annotated[NDArray[np.uint8], Shape("N")]
+    spacing: NotNegative
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("points", self.points, "N", 3)
-        count = len(self.points)
-        require_shape("normals", self.normals, count, 3)
-        require_shape("face", self.face, count)
-        require_shape("kind", self.kind, count)
-        require_finite("points", self.points)
-        require_finite("normals", self.normals)
         require_index("kind", self.kind, 3, "kinds")
-        if count and self.face.min() < 0:
+        if len(self.face) and self.face.min() < 0:
             raise ArtefactError(f"face: expected numbers of triangles, got {self.face.min()}")
 
 
@@ -166,18 +129,13 @@ class Deviation(Checked):
     (N,) the nearest triangle; ``label`` (N,), one of INTACT, DAMAGE, ADDED, OUTLIER. ``notes`` say what the scan
     does not show."""
 
-    distance: Floats
-    face: Ints
-    label: NDArray[np.uint8]
+    distance: Annotated[Floats, Shape("N")]
+    face: Annotated[Ints, Shape("N")]
+    label: Annotated[NDArray[np.uint8], Shape("N")]
     notes: tuple[str, ...] = ()
-    _dtypes: ClassVar[dict[str, Any]] = {"distance": np.float64, "face": np.int64, "label": np.uint8}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("distance", self.distance, "N")
-        require_shape("face", self.face, len(self.distance))
-        require_shape("label", self.label, len(self.distance))
-        require_finite("distance", self.distance)
         require_index("label", self.label, OUTLIER + 1, "labels")
         if len(self.face) and self.face.min() < 0:
             raise ArtefactError(f"face: expected numbers of triangles, got {self.face.min()}")
@@ -187,15 +145,12 @@ class Deviation(Checked):
 class Sites(Checked):
     """``label`` (N,) int32 per scan point: the number of its site from 1 up, 0 for a point of none. ``count`` sites."""
 
-    label: NDArray[np.int32]
-    count: int
+    label: Annotated[NDArray[np.int32], Shape("N")]
+    count: Count
     notes: tuple[str, ...] = ()
-    _dtypes: ClassVar[dict[str, Any]] = {"label": np.int32}
-    _ranges: ClassVar[dict[str, Range]] = {"count": (0, MOST)}
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_shape("label", self.label, "N")
         if len(self.label) and not 0 <= self.label.min() <= self.label.max() <= self.count:
             raise ArtefactError(
                 f"label: expected 0 to {self.count}, the count of sites, got {self.label.min()} to {self.label.max()}"

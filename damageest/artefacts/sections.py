@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar
+from typing import Annotated
 
 import numpy as np
 
 from damageest.artefacts.arrays import Floats, Vector
-from damageest.artefacts.fields import MOST, Checked, Range, require_finite, require_shape
+from damageest.artefacts.fields import Checked, Count, NotNegative, Shape, Share
 
 SECTION_KINDS = ("blade", "round", "contour", "line", "none")
 """What a section shows: an aerofoil; circles; any other outline; skin along a line; nothing of the part."""
@@ -21,10 +21,9 @@ class SectionValue(Checked):
     name: str
     nominal: Annotated[float | None, "value as designed"]
     measured: Annotated[float | None, "value as scanned; null where the scan does not show it"]
-    error: Annotated[float, "standard uncertainty of `measured`"] = 0.0
+    error: Annotated[NotNegative, "standard uncertainty of `measured`"] = 0.0
     unit: Annotated[str, "length: the job's unit"] = "length"
     note: Annotated[str, "why there is no value, or its range of validity; else empty"] = ""
-    _ranges: ClassVar[dict[str, Range]] = {"error": (0.0, MOST)}
 
     @property
     def difference(self) -> float | None:
@@ -41,20 +40,11 @@ class SectionContour(Checked):
     standard uncertainty of that by the noise. ``counts`` (K,): points that it was measured from.
     """
 
-    nominal: Floats
-    normals: Floats
-    distance: Floats
-    error: Floats
-    counts: Floats
-    _dtypes: ClassVar[dict[str, Any]] = dict.fromkeys(("nominal", "normals", "distance", "error", "counts"), np.float64)
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        require_shape("nominal", self.nominal, "K", 2)
-        require_finite("nominal", self.nominal)
-        require_shape("normals", self.normals, len(self.nominal), 2)
-        for name in ("distance", "error", "counts"):
-            require_shape(name, getattr(self, name), len(self.nominal))
+    nominal: Annotated[Floats, Shape("K", 2)]
+    normals: Annotated[Floats, Shape("K", 2, finite=False)]
+    distance: Annotated[Floats, Shape("K", finite=False)]
+    error: Annotated[Floats, Shape("K", finite=False)]
+    counts: Annotated[Floats, Shape("K", finite=False)]
 
     @property
     def measured(self) -> Floats:
@@ -83,12 +73,11 @@ class Section(Checked):
     contours: tuple[SectionContour, ...] = ()
     values: tuple[SectionValue, ...] = ()
     group: Annotated[int, "number, from 1, of the item of the job's `sections`"] = 1
-    seen: Annotated[float, "share of the outlines that the scan shows"] = 0.0
-    slab: Annotated[float, "scan points within this distance of the plane were used"] = 0.0
-    points: int = 0
+    seen: Annotated[Share, "share of the outlines that the scan shows"] = 0.0
+    slab: Annotated[NotNegative, "scan points within this distance of the plane were used"] = 0.0
+    points: Count = 0
     marks: tuple[tuple[str, float, float], ...] = ()
     notes: tuple[str, ...] = ()
-    _ranges: ClassVar[dict[str, Range]] = {"seen": (0.0, 1.0), "slab": (0.0, MOST), "points": (0, MOST)}
 
     def value(self, name: str) -> SectionValue:
         """The quantity of this name. Raises KeyError where it was not asked for."""

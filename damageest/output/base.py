@@ -64,7 +64,8 @@ def _derive_field(of: type, name: str, hints: dict[str, Any], own: Any) -> Any:
         hint, words = typing.get_type_hints(getter)["return"], inspect.getdoc(getter) or ""
         text = " ".join((words[:1].lower() + words[1:]).partition("\n\n")[0].removesuffix(".").split())
     elif typing.get_origin(hint) is Annotated:
-        hint, text = typing.get_args(hint)
+        hint, *notes = typing.get_args(hint)
+        text = next((note for note in notes if isinstance(note, str)), "")
     kind = own or _to_json(hint)
     return Annotated[kind, Field(description=text)] if text else kind
 
