@@ -32,8 +32,9 @@ ALIKE = {
     "none.py",  # the implementation that does nothing
     "file.py", "files.py", "meshes.py", "paths.py", "scans.py", "sections.py", "large_scans.py",  # the value, its work
     "coverage.py", "scanner.py", "sensor.py", "surplus.py", "uncertainty.py", "verdicts.py",  # the measure, its step
-    "beyond_points.py", "dent.py", "fading.py", "free_pose.py", "inner_surface.py", "one_motion.py", "other_method.py",
+    "beyond_points.py", "fading.py", "free_pose.py", "inner_surface.py", "other_method.py",
     "two_sheets.py",  # the measure of a doubt, its rule
+    "adapt.py", "form.py", "noise.py", "pose.py", "views.py",  # a cause, its term of the interval
     "schema.py", "reference.py", "page.py", "run.py", "polygons.py", "pieces.py",
 }  # fmt: skip
 """Files of the core that have one name in two rooms, in one sense."""

@@ -45,7 +45,7 @@ def _add(facts: SiteFacts, rule: Rule, measure: Callable[[], Mapping[str, Any]])
     if not rule.owner:
         found = measure()
         return replace(facts, **found) if found else facts
-    given = _ask_foreign(rule, lambda: dict(measure()))
+    given = _call_foreign(rule, lambda: dict(measure()))
     if isinstance(given, Reason):
         return replace(facts, failed={**facts.failed, rule.code: given})
     return replace(facts, measured={**facts.measured, **given}) if given else facts
@@ -80,7 +80,7 @@ def apply_foreign_rule(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Rea
     """The reasons of a rule of a plugin; where it fails, or gives what is none of its own, one that says so."""
     if rule.code in site.failed:
         return [site.failed[rule.code]]
-    found = _ask_foreign(rule, lambda: list(rule.find_reasons(site, scan)))
+    found = _call_foreign(rule, lambda: list(rule.find_reasons(site, scan)))
     if isinstance(found, Reason):
         return [found]
     for reason in found:
@@ -95,7 +95,7 @@ def apply_foreign_rule(rule: Rule, site: SiteFacts, scan: ScanFacts) -> list[Rea
     return found
 
 
-def _ask_foreign(rule: Rule, ask: Callable[[], T]) -> T | Reason:
+def _call_foreign(rule: Rule, ask: Callable[[], T]) -> T | Reason:
     """What a rule of a plugin answers; where it fails, the reason that says so."""
     try:
         with at_work(f"rule {rule.code}", owner=rule.owner):
