@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from damageest.artefacts import Flags, Floats, Solid
+from damageest.artefacts import Flags, Floats, Solid, Vector
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.edges import pair_faces
 from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
@@ -43,7 +43,8 @@ surface, as that of an undercut."""
 class BeyondPoints:
     """``amount``: volume that no scan point shows; ``share`` of the whole. ``reason`` in words, empty for a share that
     does not matter. ``depth``: of the farthest point from the skin. ``short``: volume that the points show, and that it
-    does not hold.
+    does not hold. ``at``: the place (3,) that lies farthest behind its points, in the part's frame; None where it is
+    not between points that the volume is too large.
     """
 
     amount: float = 0.0
@@ -51,6 +52,7 @@ class BeyondPoints:
     depth: float = 0.0
     reason: str = ""
     short: float = 0.0
+    at: Vector | None = None
 
     @property
     def is_contradicted(self) -> bool:
@@ -73,7 +75,7 @@ def measure_beyond_points(solid: Solid, field: ScanField, own: Floats, unit: str
     area = solid.face_areas
     skin = take_lost_skin(solid, inner)
     depth = float(distance_to_mesh(own[:: max(1, len(own) // MOST)], skin).max())
-    behind, before, bare = _compare_with_points(
+    places, behind, before, bare = _compare_with_points(
         solid, inner, field.points, 2 * max(gap, tolerance), BARE * max(gap, tolerance)
     )
     slack = NOISES * noise + GAPS * gap
@@ -86,36 +88,42 @@ def measure_beyond_points(solid: Solid, field: ScanField, own: Floats, unit: str
     over = 0.0 if is_shown else volume - most
     amount = max(bulge, over, 0.0)
     share = amount / max(volume, 1e-300)
-    reason = ""
+    reason, at = "", None
     if share > ASKED and over >= bulge:
         reason = (
             f"its volume of {volume:.4g} {unit}³ exceeds lost skin times depth ({most:.4g} {unit}³): its surface "
             "bulges without scan points"
         )
     elif share > ASKED:
+        x, y, z = at = _to_tuple(places[behind.argmax()])
         reason = (
-            f"its surface bulges by {amount:.3g} {unit}³ ({share:.1%}), up to {behind.max():.3g} {unit}, between "
-            f"points that are {gap:.3g} {unit} apart"
+            f"its surface bulges by {amount:.3g} {unit}³ ({share:.1%}), up to {behind.max():.3g} {unit} near "
+            f"({x:.4g}, {y:.4g}, {z:.4g}), between points that are {gap:.3g} {unit} apart"
         )
-    return BeyondPoints(amount, share, depth, reason, short)
+    return BeyondPoints(amount, share, depth, reason, short, at)
 
 
 def _compare_with_points(
     solid: Solid, inner: Flags, points: Floats, wide: float, far: float
-) -> tuple[Floats, Floats, float]:
-    """How far places (P,) all over the inner faces lie behind all scan points near them, seen from the volume, and how
-    far before most of them; and the share of the places that have no point within ``far``. Farther than ``wide``, none
-    is near."""
+) -> tuple[Floats, Floats, Floats, float]:
+    """Places (P,3) all over the inner faces; how far each (P,) lies behind all scan points near it, as the volume
+    sees it, and how far before most of them; and the share of the places that have no point within ``far``. Farther
+    than ``wide``, none is near."""
     places, face = sample_by_area(solid, PLACES, np.random.default_rng(0), np.flatnonzero(inner))
     points = points[find_in_box(points, places.min(axis=0) - wide, places.max(axis=0) + wide)]
     if not len(points):
-        return np.zeros(len(places)), np.zeros(len(places)), 1.0
+        return places, np.zeros(len(places)), np.zeros(len(places)), 1.0
     distance, index = find_neighbours(places, NEAR, points)
     height = np.einsum("ikj,ij->ik", places[:, None] - points[index], solid.face_normals[face])
     is_near = distance <= wide
     lowest = np.where(is_near, height, np.inf).min(axis=1)
     before = np.where(is_near.all(axis=1), -np.median(height, axis=1), 0.0)
-    return np.where(is_near[:, 0], lowest, 0.0), before, float((distance[:, 0] > far).mean())
+    return places, np.where(is_near[:, 0], lowest, 0.0), before, float((distance[:, 0] > far).mean())
+
+
+def _to_tuple(place: Floats) -> Vector:
+    x, y, z = place.tolist()
+    return x, y, z
 
 
 def _measure_hollow(solid: Solid, skin: Flags) -> float:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar
 
-from damageest.artefacts import Evidence, Flags, Floats, Ints, Pose, Reason, Solid
+from damageest.artefacts import Evidence, Flags, Floats, Ints, Pose, Reason, Solid, Vector
 from damageest.findings import Coverage, Interval, ModelFit, Uncertainty
 from damageest.geometry.scan_field import ScanField
 from damageest.trust.skin.coverage import SkinView, find_removed_cells
@@ -83,11 +83,11 @@ class SiteFacts:
     skin in another pose that fits as well. ``free``: motions that the scan leaves free. ``displaced``: numbers of the
     surplus as large as the loss, ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that
     may be dented there, else 0. ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no
-    scan point shows, and ``beyond_words``: how it was found. ``shut`` and ``turned``: shares of its inner surface that
-    could be seen from nowhere, and only from where the skin beside it was not seen. ``other_volume``: by the other
-    method; None where that was not asked, NaN where it gave none. ``terms``: of the interval, those of plugins
-    among them. ``measured``: what rules of plugins measured, by
-    their names; ``failed``: why a rule could not measure, by its code.
+    scan point shows, and ``beyond_words``: how it was found, ``beyond_at``: where. ``shut`` and ``turned``: shares of
+    its inner surface that could be seen from nowhere, and only from where the skin beside it was not seen.
+    ``other_volume``: by the other method; None where that was not asked, NaN where it gave none. ``terms``: of the
+    interval, those of plugins among them. ``measured``: what rules of plugins measured, by their names; ``failed``: why
+    a rule could not measure, by its code.
     """
 
     volume: float
@@ -115,6 +115,7 @@ class SiteFacts:
     covered: tuple[tuple[int, float], ...] = ()
     beyond: float = 0.0
     beyond_words: str = ""
+    beyond_at: Vector | None = None
     shut: float = 0.0
     turned: float = 0.0
     other_volume: float | None = None

@@ -56,6 +56,16 @@ def test_a_surface_below_its_points_is_contradicted() -> None:
     assert found.depth == pytest.approx(DEPTH, abs=0.02)
 
 
+def test_the_place_where_it_bulges_is_told() -> None:
+    """A pocket that came out right but for a bump in its floor, at x = 3."""
+    bump = Manifold.sphere(1.5, 48).scale((1, 1, 0.8)).translate((3, 0, 4 - DEPTH))
+    found = ask(pocket(DEPTH) + bump, pocket(DEPTH))
+    assert found.reason
+    assert found.at is not None
+    assert found.at[:2] == pytest.approx((3, 0), abs=0.8)
+    assert f"near ({found.at[0]:.4g}" in found.reason
+
+
 def test_more_than_skin_times_depth_is_contradicted() -> None:
     points = scan(block() - pocket(DEPTH))
     found = ask(pocket(5.0), pocket(DEPTH), points)

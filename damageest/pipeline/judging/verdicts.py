@@ -135,6 +135,7 @@ def _gather_site_facts(state: JobState, site: FoundSite, held: bool) -> SiteFact
         covered=site.covered,
         beyond=site.beyond.amount,
         beyond_words=site.beyond.reason,
+        beyond_at=site.beyond.at,
         other_volume=site.other_volume,
         terms=state.terms,
     )

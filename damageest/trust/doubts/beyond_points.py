@@ -22,4 +22,4 @@ class BeyondPointsRule(Rule):
             return
         is_against = site.beyond > CONTRADICTED * site.volume
         effect: Effect = "contradicts" if is_against else "open"
-        yield Reason(self.code, site.beyond_words, effect, site.beyond, f"{scan.unit}³", remedy=self.remedy)
+        yield Reason(self.code, site.beyond_words, effect, site.beyond, f"{scan.unit}³", site.beyond_at, self.remedy)
