@@ -1,4 +1,4 @@
-"""What the commands that write tables into pages share."""
+"""Options that the commands share, and what those need that write tables into pages."""
 
 from __future__ import annotations
 
@@ -6,9 +6,20 @@ import shlex
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Annotated
 
+import typer
+from damageest_evaluate.commands.counted import AsJson as AsJson
 from damageest_evaluate.commands.counted import prepare_folder, show_table
+from damageest_evaluate.commands.job import Timeout as Timeout
 from damageest_evaluate.processes import Row
+
+Workers = Annotated[int, typer.Option(min=1, help="Runs at the same time.")]
+RowsFolder = Annotated[Path | None, typer.Option(file_okay=False, help="Folder for the rows, to resume from.")]
+RowsFile = Annotated[
+    Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
+]
+Write = Annotated[Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")]
 
 
 def split_words(text: str) -> list[str]:

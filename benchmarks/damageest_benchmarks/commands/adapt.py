@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers
 
 
 def command(
@@ -17,9 +18,9 @@ def command(
     use: Annotated[str, typer.Option(metavar="A,B", help="straight, none, auto, plain, drift. Default: all.")] = "",
     every: Annotated[int, typer.Option(min=1, help="Take one case of so many.")] = 1,
     points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 120_000,
-    workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for adapt.jsonl, to resume from.")] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 300,
+    out: RowsFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Measure the stage adapt on deformed parts. Their loss is known; compared with rigid and plain fits and parts as

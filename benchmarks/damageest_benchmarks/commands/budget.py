@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
@@ -15,10 +15,10 @@ def command(
     batch: Annotated[int, typer.Option(min=1, help="Draws of one part in one process.")] = 25,
     same: Annotated[bool, typer.Option("--same/--other", help="The same damage in all draws of a part.")] = True,
     seed: Annotated[int, typer.Option(min=0, help="Seed of all draws.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Processes that run at the same time.")] = 2,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a process is stopped.")] = 3600,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for budget.jsonl, to resume from.")] = None,
-    write: Annotated[Path | None, typer.Option(help="File whose table between the marks `budget` is replaced.")] = None,
+    workers: Workers = 2,
+    timeout: Timeout = 3600,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Count intervals that hold the truth for certified scans. Scans are drawn with the errors that a certificate

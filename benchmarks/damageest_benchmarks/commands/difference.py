@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
     pairs: Annotated[str, typer.Option(metavar="A,B", help="Words in the names of pairs. Default: all.")] = "",
     seeds: Annotated[str, typer.Option(help="Seeds of the scans.")] = "0",
-    workers: Annotated[int, typer.Option(min=1, help="Processes that run at the same time.")] = 2,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a process is stopped.")] = 900,
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder for difference.jsonl, to resume from.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="File whose table between the marks `difference` is replaced.")
-    ] = None,
+    workers: Workers = 2,
+    timeout: Timeout = 900,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare pairs of scans with a known loss between them.

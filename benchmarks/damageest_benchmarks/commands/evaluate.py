@@ -41,29 +41,18 @@ from damageest_benchmarks.commands import (
     steady,
     worn,
 )
-from damageest_benchmarks.commands._counted import prepare_places
+from damageest_benchmarks.commands._counted import Write, prepare_places
 from damageest_benchmarks.commands.intervals import show_intervals
 
 if TYPE_CHECKING:
     from damageest_benchmarks.matrix import MatrixCell
 
-app.command("adapt")(adapt.command)
-app.command("budget")(budget.command)
-app.command("difference")(difference.command)
-app.command("family")(family.command)
-app.command("honesty")(honesty.command)
-app.command("inspections")(inspections.command)
-app.command("named")(named.command)
-app.command("others")(others.command)
-app.command("real")(real.command)
-app.command("realistic")(realistic.command)
+for module in (
+    adapt, budget, difference, family, honesty, inspections, named, others, real, realistic, steady, sections, speed,
+    worn, path, prepare,
+):  # fmt: skip
+    app.command(module.__name__.rpartition(".")[2])(module.command)
 app.command("reported")(others.reported)
-app.command("steady")(steady.command)
-app.command("sections")(sections.command)
-app.command("speed")(speed.command)
-app.command("worn")(worn.command)
-app.command("path")(path.command)
-app.command("prepare")(prepare.command)
 
 
 @app.command("suite")
@@ -101,9 +90,7 @@ def suite_command(
     out: Out = None,
     plots: Plots = True,
     as_json: AsJson = False,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the tables.")
-    ] = None,
+    write: Write = None,
     marks: Annotated[
         str, typer.Option(help="Name in the marks <!-- NAME: begin --> and <!-- NAME: end --> of --write.")
     ] = "suite",
@@ -156,10 +143,8 @@ def matrix_command(
     jobs: Annotated[list[Path], typer.Argument(metavar="JOB...", help="Job files whose scan is simulated.")],
     stage: Annotated[list[str] | None, typer.Option(help="Only this stage. May be repeated.")] = None,
     workers: Annotated[int, typer.Option(help="Runs at the same time. More than 1 makes each run slower.")] = 1,
-    timeout: Annotated[float, typer.Option(help="Seconds after which a run is stopped.")] = 300,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the matrix marks are replaced by the table.")
-    ] = None,
+    timeout: Timeout = 300,
+    write: Write = None,
     marks: Annotated[str, typer.Option(help="Name in the marks of --write.")] = "matrix",
     as_json: AsJson = False,
 ) -> None:

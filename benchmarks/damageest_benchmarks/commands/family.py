@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
@@ -15,12 +15,10 @@ def command(
     ] = None,
     every: Annotated[int, typer.Option(min=1, help="Take one draw of so many.")] = 1,
     seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds of the draws, instead of --every.")] = "",
-    workers: Annotated[int, typer.Option(min=1, help="Draws that run at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for family.jsonl, to resume from.")] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
-    ] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 300,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Count right results on random draws of families. Families: walls (300), hands (60), turned (60), datums (40),

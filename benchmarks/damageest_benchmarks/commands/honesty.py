@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
@@ -17,17 +17,13 @@ def command(
     seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds; each case runs once with each of them.")] = "0",
     case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases, from the list of silent ones.")] = "",
     points: Annotated[int, typer.Option(min=100, help="Number of points of each scan.")] = 50_000,
-    workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 2,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 300,
+    workers: Workers = 2,
+    timeout: Timeout = 300,
     scheduler: Annotated[
         str, typer.Option(metavar="ADDRESS", help="Run on the Dask cluster at this address, instead of --workers here.")
     ] = "",
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder for honesty.jsonl, to resume from, and honesty.md.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
-    ] = None,
+    out: RowsFolder = None,
+    write: Write = None,
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -2,23 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
     draws: Annotated[int, typer.Option(min=1, help="Workpieces, each with twelve inspections.")] = 10,
-    workers: Annotated[int, typer.Option(min=1, help="Workpieces that run at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a workpiece is stopped.")] = 1800,
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder for inspections.jsonl, to resume from.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="File with the marks of this table, to write it there.")
-    ] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 1800,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Count right verdicts on repaired parts. Faulty parts signed as met are listed.

@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
     backgrounds: Annotated[list[str] | None, typer.Argument(metavar="BACKGROUND...", help="Default: all.")] = None,
     draws: Annotated[int, typer.Option(min=1, help="Number of random damages, on thirteen parts in turn.")] = 40,
     seeds: Annotated[str, typer.Option(metavar="A,B", help="Seeds of the draws, instead of --draws.")] = "",
-    workers: Annotated[int, typer.Option(min=1, help="Draws that run at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a draw is stopped.")] = 600,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for named.jsonl, to resume from.")] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
-    ] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 600,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Compare each named background with the default. On random damages with known truth.

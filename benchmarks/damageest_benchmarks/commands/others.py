@@ -6,18 +6,18 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
     folder: Annotated[Path, typer.Argument(exists=True, file_okay=False, help="Folder with files of CAD or meshes.")],
     seed: Annotated[int, typer.Option(min=0, help="Seed of the losses, scans and poses.")] = 0,
-    workers: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for others.jsonl, to resume from.")] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
-    ] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 600,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Find a drawn loss on each part of a folder.
@@ -48,14 +48,10 @@ def reported(
     words: Annotated[
         list[str] | None, typer.Argument(help="Words of a report's kind or address. Default: all reports.")
     ] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder for reported.jsonl, to resume from.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
-    ] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 600,
+    out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Run what users of other tools report in public, made anew with known truth.

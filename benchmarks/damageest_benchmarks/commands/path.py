@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
 
-from damageest_benchmarks.commands._counted import prepare_places, write_measured
+from damageest_benchmarks.commands._counted import AsJson, RowsFile, Write, prepare_places, write_measured
 
 
 def command(
@@ -25,12 +25,8 @@ def command(
     part: Annotated[
         list[Path] | None, typer.Option(help="A part's file, in mm; it gets as many losses as --each says.")
     ] = None,
-    out: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the path marks are replaced by the table.")
-    ] = None,
+    out: RowsFile = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Plan and check paths for deposits of known shape. Checks fill and collisions of the nozzle.

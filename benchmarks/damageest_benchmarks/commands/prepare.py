@@ -3,23 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
 
-from damageest_benchmarks.commands._counted import prepare_places, write_measured
+from damageest_benchmarks.commands._counted import AsJson, RowsFile, Write, prepare_places, write_measured
 
 
 def command(
     count: Annotated[int, typer.Option(min=1, help="Number of damages.")] = 20,
-    out: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="JSON Lines file for the rows. A run goes on from it.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the prepare marks are replaced by the table.")
-    ] = None,
+    out: RowsFile = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Measure what opening a damage adds to a 3-axis path."""

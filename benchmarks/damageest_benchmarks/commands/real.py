@@ -6,7 +6,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers
 
 
 def command(
@@ -15,9 +17,9 @@ def command(
         str, typer.Option(metavar="A,B", help="own, or seeds of points drawn. Default: own,7,8,9,10.")
     ] = "",
     tolerances: Annotated[str, typer.Option(metavar="A,B", help="Default: 0.15,0.2,0.3,auto.")] = "",
-    workers: Annotated[int, typer.Option(min=1, help="Runs at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 900,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for real.jsonl, to resume from.")] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 900,
+    out: RowsFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Run real parts and compare them with a crude difference.

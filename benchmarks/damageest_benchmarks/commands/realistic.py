@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
@@ -17,14 +17,10 @@ def command(
     case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases, from --list.")] = "",
     every: Annotated[int, typer.Option(min=1, help="Take one case of so many.")] = 1,
     points: Annotated[int, typer.Option(min=1000, help="Number of points of each scan.")] = 40_000,
-    workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a case is stopped.")] = 600,
-    out: Annotated[
-        Path | None, typer.Option(file_okay=False, help="Folder for realistic.jsonl, to resume from, and realistic.md.")
-    ] = None,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the marks are replaced by the table.")
-    ] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 600,
+    out: RowsFolder = None,
+    write: Write = None,
     show: Annotated[bool, typer.Option("--list", help="Only list the cases.")] = False,
     as_json: AsJson = False,
 ) -> None:

@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, Write
 
 
 def command(
     draws: Annotated[int, typer.Option(min=1, help="Shafts, six kinds in turn.")] = 60,
-    write: Annotated[
-        Path | None, typer.Option(dir_okay=False, help="File with the marks of this table, to write it there.")
-    ] = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Count shaft diameters within their uncertainty.

@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
 
-from damageest_benchmarks.commands._counted import prepare_places
+from damageest_benchmarks.commands._counted import AsJson, Timeout, Write, prepare_places
 
 
 def command(
@@ -22,10 +22,8 @@ def command(
         list[str] | None, typer.Option("--set", help="Replace a value of the job: stage.option=value or field=value.")
     ] = None,
     repeat: Annotated[int, typer.Option(min=1, help="Runs of each case; the median is given.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
-    write: Annotated[
-        Path | None, typer.Option(help="Text file. Its lines between the speed marks are replaced by the table.")
-    ] = None,
+    timeout: Timeout = 600,
+    write: Write = None,
     as_json: AsJson = False,
     whole: Annotated[
         bool,

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers
 
 
 def command(
     case: Annotated[str, typer.Option(metavar="A,B", help="Numbers of cases of the honesty suite. Default: 26.")] = "",
     points: Annotated[int, typer.Option(min=100, help="Number of points of each scan.")] = 30_000,
-    workers: Annotated[int, typer.Option(min=1, help="Cases that run at the same time.")] = 2,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a case is stopped.")] = 900,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for steady.jsonl, to resume from.")] = None,
+    workers: Workers = 2,
+    timeout: Timeout = 900,
+    out: RowsFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Draw scans again and compare the verdicts.

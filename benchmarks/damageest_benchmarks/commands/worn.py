@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from damageest_evaluate.commands.counted import AsJson, show_table
+from damageest_evaluate.commands.counted import show_table
+
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers
 
 
 def command(
     every: Annotated[int, typer.Option(min=1, help="Take one draw of so many.")] = 1,
-    workers: Annotated[int, typer.Option(min=1, help="Draws that run at the same time.")] = 1,
-    timeout: Annotated[float, typer.Option(min=0, help="Seconds after which a run is stopped.")] = 600,
-    out: Annotated[Path | None, typer.Option(file_okay=False, help="Folder for worn.jsonl, to resume from.")] = None,
+    workers: Workers = 1,
+    timeout: Timeout = 600,
+    out: RowsFolder = None,
     as_json: AsJson = False,
 ) -> None:
     """Count right results on 60 worn parts. Bushes, dies, rails, cams, seats and punches.
