@@ -17,6 +17,13 @@ FIGURES = {
     "probing_size": Figure("probing_size", 0.01, "mm", 0.5, "normal"),
     "length": Figure("length", 2e-4, "", 1.0, "rectangular"),
 }
+BOUNDS = {
+    "inside": ("inside", "high"),
+    "beside": ("beside", "high"),
+    "fading": ("fading", "high"),
+    "less": ("closed", "low"),
+}
+"""What moves one end: the term, and which."""
 SOURCES = {"noise": 0.02, "tessellation": 0.01 / 3**0.5}
 
 
@@ -31,6 +38,9 @@ def change(error: SiteError, **named: Any) -> SiteError:
     shares = {term.name: share for term, share in error.shares}
     if "scanner" in named:
         named |= dict(zip(("probing_size", "length"), named.pop("scanner"), strict=True))
+    for name in [name for name in named if name in BOUNDS]:
+        term, end = BOUNDS[name]
+        shares[term] = Share(**{end: named.pop(name)})
     for name in [name for name in named if name in TERMS]:
         shares[name] = Share(named.pop(name), 0.0, SOURCES.get(name, 0.0), FIGURES.get(name))
     return replace(error, shares=tuple((TERMS[name], shares[name]) for name in TERMS if name in shares), **named)
@@ -38,6 +48,9 @@ def change(error: SiteError, **named: Any) -> SiteError:
 
 def take(error: SiteError, name: str) -> Any:
     """What a term makes of the volume, (J,), or a field of the error."""
+    if name in BOUNDS:
+        of, end = BOUNDS[name]
+        return sum(getattr(share, end) for term, share in error.shares if term.name == of)
     found = [share.columns for term, share in error.shares if term.name == name]
     if name in TERMS:
         return found[0] if found else np.zeros(1)

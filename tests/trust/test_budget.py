@@ -98,7 +98,7 @@ def test_a_figure_of_the_certificate_has_its_row_though_it_changes_nothing() -> 
 
 
 def test_what_moves_one_end_is_a_bound_and_no_row() -> None:
-    budget = make([replace(PLAIN, inside=7.0, less=3.0)])
+    budget = make([change(PLAIN, inside=7.0, less=3.0)])
     assert {(one.source, one.low, one.high) for one in budget.bounds} == {("inside", 0.0, 7.0), ("closed", -3.0, 0.0)}
     assert budget.combined == pytest.approx(2)
 

@@ -12,8 +12,8 @@ import damageest
 from damageest.artefacts import Mesh, Part, Scan, Solid
 from damageest.findings import Coverage, UnseenRegion
 from damageest.stages.scan.simulate import Simulate
-from damageest.trust.interval.uncertainty import limit_beside
 from damageest.trust.skin.unseen_rim import find_unseen_beside, measure_unseen_rim
+from damageest.trust.terms.beside import limit_beside
 from tests import damaged_box
 
 LEAST = {"version": 1, "tolerance": 0.2, "align": "none"}

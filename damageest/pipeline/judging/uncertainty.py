@@ -38,7 +38,7 @@ from damageest.trust.interval.site_error import (
     measure_certain,
     sum_free,
 )
-from damageest.trust.interval.uncertainty import limit_beside, measure_site_error
+from damageest.trust.interval.uncertainty import measure_site_error
 from damageest.trust.scan_quality import describe_few
 from damageest.trust.skin.coverage import find_removed_cells
 from damageest.trust.terms.noise import Noise
@@ -49,8 +49,6 @@ COARSE = 0.05
 """Point spacing, in diagonals of the part, from which a loss between the points can be of any size."""
 ROUGH = 0.1
 """Standard deviation of where the closed surface of a pore lies, in gaps between its points."""
-BESIDE = 2.0
-"""Distance from a damage volume, in reaches, within which unseen skin may be part of the same loss."""
 
 
 @step(
@@ -160,20 +158,18 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
     loss = Loss(site.damage, inner, points, site.evidence, beyond)
     errors = replace(state.errors, pose=pose, facts=facts)
     # what the model fit gives is the 95 % bound of a deviation
-    case = LossCase(loss, state.field, errors, _measure_form(state, site), state.adapted)
+    fading = _measure_fading(state, site, inner, taken, pose)
+    bent_wall = find_bent_wall(site.damage, state.skin, state.field, site.members)
+    case = LossCase(
+        loss, state.field, errors, _measure_form(state, site), state.adapted, state.coverage, fading, bent_wall
+    )
     found = measure_site_error(case, state.terms, state.pose.free)
     if found is None:
         return replace(site, uncertainty=Uncertainty(None, None))
-    reach = BESIDE * max(2 * state.tolerance, 1.5 * state.aligned.spacing)
-    fading = _measure_fading(state, site, inner, taken, pose)
     dependences = measure_dependence(site.damage, state.part, state.pose)
     extrapolated, extrapolated_error = _measure_extrapolated(state, site.damage, inner)
-    bent_wall = find_bent_wall(site.damage, state.skin, state.field, site.members)
     error = replace(
         found,
-        less=found.less + (site.damage.volume if bent_wall else 0.0),
-        beside=limit_beside(state.coverage, site.damage, inner, reach, found.depth),
-        fading=fading.beyond if fading else 0.0,
         rates=np.append(found.rates, [one.rate for one in dependences]),
         motions=np.concatenate([found.motions, *([[one.motion.low, one.motion.high]] for one in dependences)]),
     )
@@ -181,7 +177,6 @@ def _measure_site(state: JobState, site: FoundSite, taken: _TakenSkin, pose: Pos
         _describe(error, state.unit),
         extrapolated=extrapolated,
         extrapolated_error=extrapolated_error,
-        beside=error.beside,
         fading=fading,
         certain=measure_certain(error),
     )
@@ -208,13 +203,15 @@ def _describe(error: SiteError, unit: str) -> Uncertainty:
     """What the errors of a site say of its volume and depth: intervals, terms and budgets."""
     volume, depth = combine_site(error)
     by_term = error.measure_terms()
-    known = {one.name for one in fields(Uncertainty)}
+    bounds = {term.name: share.high for term, share in error.shares}
+    known = {one.name for one in fields(Uncertainty)} - {"inside", "beside", "fading"}
     scanner = [size for name, size in by_term.items() if name in TERMS]
     return Uncertainty(
         volume,
         depth,
         free=error.free,
-        inside=error.inside,
+        inside=bounds.get("inside", 0.0),
+        beside=bounds.get("beside", 0.0),
         scanner=float(np.linalg.norm(scanner)) if scanner else 0.0,
         budget=make_volume_budget([error], unit, free=error.free),
         depth_budget=make_depth_budget(error, unit),

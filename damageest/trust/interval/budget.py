@@ -47,14 +47,19 @@ def make_volume_budget(
         rows.append(_Row(term, columns, source, unit, shares[0].figure))
     bounds = [
         BudgetBound("free", "motions that the scan leaves free", *free),
-        BudgetBound("closed", "inner surface closed across unseen places", -sum(x.less for x in errors), 0.0),
-        BudgetBound("inside", "inner surface without points", 0.0, sum(x.inside for x in errors)),
-        BudgetBound("beside", "unseen skin beside the site", 0.0, sum(x.beside for x in errors)),
-        BudgetBound("form", "adaptation that makes the part thinner", 0.0, sum(x.taken for x in errors)),
-        BudgetBound("fading", "loss that fades out beyond the rim", 0.0, sum(x.fading for x in errors)),
+        *_list_bounds(errors),
         BudgetBound("doubtful", "sites that are not accepted, and places that may be damage", 0.0, doubtful),
     ]
     return _sum_up(rows, bounds, -sum(one.excess for one in errors))
+
+
+def _list_bounds(errors: Sequence[SiteError]) -> list[BudgetBound]:
+    """What moves one end of the interval, of each term."""
+    found = []
+    for term, shares in gather_shares(errors):
+        low, high = sum(share.low for share in shares), sum(share.high for share in shares)
+        found.append(BudgetBound(term.bound or term.name, term.text, -low, high))
+    return found
 
 
 def make_depth_budget(error: SiteError, unit: str) -> Budget | None:

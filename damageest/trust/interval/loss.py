@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from damageest.artefacts import AdaptedPart, Evidence, Flags, Floats, Part, Solid
+from damageest.findings import Coverage, Fading
 from damageest.geometry.barycentric import find_barycentric
 from damageest.geometry.distance import closest_on_mesh
 from damageest.geometry.lost_depth import LostDepth
@@ -16,7 +17,7 @@ from damageest.geometry.neighbourhoods import find_nearby, find_neighbours
 from damageest.geometry.scan_field import ScanField
 from damageest.trust.beyond_points import BeyondPoints
 from damageest.trust.doubt import ScanFacts
-from damageest.trust.interval.inner_surface import InnerSurface, measure_inner_surface
+from damageest.trust.interval.inner_surface import GAP, InnerSurface, measure_inner_surface
 from damageest.trust.interval.pose_error import PoseError
 from damageest.trust.interval.scanner import FigureShare, ScannerErrors, find_shares
 
@@ -69,7 +70,9 @@ class LossCase:
     """What a term of the interval is measured on: a ``loss``, the ``field`` of its scan, and the ``errors`` of that.
 
     ``form``: standard deviation by which the skin deviates systematically, in the job's unit, as a fit of the model
-    gives it. ``adapted``: the part as it was deformed, None where it was not.
+    gives it. ``adapted``: the part as it was deformed, None where it was not. ``coverage``: its unseen regions, None
+    where nobody asked; ``fading``: the volumes of a loss that fades out; ``bent_wall``: thickness of a wall that may be
+    dented there, else 0.
     """
 
     loss: Loss
@@ -77,6 +80,9 @@ class LossCase:
     errors: ScanErrors
     form: float = 0.0
     adapted: AdaptedPart | None = None
+    coverage: Coverage | None = None
+    fading: Fading | None = None
+    bent_wall: float = 0.0
 
     @property
     def tolerance(self) -> float:
@@ -127,6 +133,17 @@ class LossCase:
         loss = self.loss
         gap = self.surface.gap if self.surface else 0.0
         return _find_deepest(loss.damage, loss.inner, self.field.part, loss.points, 3 * max(gap, self.tolerance))
+
+    @property
+    def depth(self) -> float:
+        """The largest depth of the damage volume, corrected for its mean error."""
+        return self.deepest.depth - (self.surface.depth_excess if self.surface else 0.0)
+
+    @property
+    def hole(self) -> float:
+        """Area of the largest piece of the inner surface without points, where it counts, else 0."""
+        gap = self.loss.evidence.ids_gap
+        return gap if gap > GAP * max(self.tolerance, self.field.aligned.spacing) ** 2 else 0.0
 
     @cached_property
     def bent(self) -> tuple[Floats, float]:

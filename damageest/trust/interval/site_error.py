@@ -34,6 +34,7 @@ class Term(ABC):
     ``name``: of the source, the same from version to version; ``text``: the source in words; ``type``: A, from this
     scan by statistics, or B, from other knowledge (JCGM 100); ``rank``: its place in the budget, the lowest first.
     ``words`` and ``remedy``: how the reason `wide_interval` names it, and what makes it smaller; empty: it does not.
+    ``bound``: the name of what moves one end of the interval, where it is not the term's.
     ``is_own``: different in each site, and not common to all. ``is_of_surface``: an error of the inner surface itself,
     and not of the skin above it. ``is_of_points``: the depth of each scan point has it as well.
     """
@@ -44,6 +45,7 @@ class Term(ABC):
     distribution: ClassVar[Distribution] = "normal"
     words: ClassVar[str] = ""
     remedy: ClassVar[str] = ""
+    bound: ClassVar[str] = ""
     rank: ClassVar[int] = 1000
     is_own: ClassVar[bool] = False
     is_of_surface: ClassVar[bool] = False
@@ -62,13 +64,16 @@ class Share:
 
     ``volume``: change of the volume, signed where sites may differ in sign; (J,) for a source of J independent errors.
     ``depth``: of the largest depth. ``source``: standard uncertainty of the source in the job's unit, 0: what moves the
-    inner surface by as much. ``figure``: of the certificate, where it is the source.
+    inner surface by as much. ``figure``: of the certificate, where it is the source. ``low``, ``high``: by how much the
+    volume may be smaller and larger beyond that, at most: metal that nothing shows.
     """
 
     volume: float | Floats = 0.0
     depth: float = 0.0
     source: float = 0.0
     figure: Figure | None = None
+    low: float = 0.0
+    high: float = 0.0
 
     @property
     def columns(self) -> Floats:
@@ -82,15 +87,12 @@ class SiteError:
 
     ``shares``: of the terms, in the order of the budget. ``excess``: by how much the volume is too large on average;
     ``rates`` (M,): change of the volume for each unit of each free motion, by the other field of an adapted part, and
-    where its growth is the scan's; ``motions`` (M,2): their ends;
-    ``inside`` (where points do not bound it), ``beside``, ``fading``, ``taken`` (what the field of an adapted part made
-    thinner there, and wear may have): by how much the loss may be larger; ``less``: by
-    how much it may be smaller, since the inner surface was closed across what was not seen. ``depth``: of the damage
-    volume, corrected for its mean error; ``depth_free``: change by the free motions. ``corner``: how far a corner of
-    the inner surface goes beyond the volume and its scan points. ``measured``: the largest depth of a scan point, with
-    what its noise, the pose and the skin may be off, and the corner. ``exposed``: the area that is moved against the
-    skin by what deviates. ``depths`` (Q,): quantiles of how deep the loss is over that area: where it is shallow, no
-    more than that is in doubt.
+    where its growth is the scan's; ``motions`` (M,2): their ends. ``depth``: of the damage volume, corrected for its
+    mean error; ``depth_free``: change by the free motions. ``corner``: how far a corner of the inner surface goes
+    beyond the volume and its scan points. ``measured``: the largest depth of a scan point, with what its noise, the
+    pose and the skin may be off, and the corner. ``exposed``: the area that is moved against the skin by what deviates.
+    ``depths`` (Q,): quantiles of how deep the loss is over that area: where it is shallow, no more than that is in
+    doubt.
     """
 
     volume: float
@@ -98,11 +100,6 @@ class SiteError:
     excess: float = 0.0
     rates: Floats = field(default_factory=lambda: np.empty(0))
     motions: Floats = field(default_factory=lambda: np.empty((0, 2)))
-    inside: float = 0.0
-    less: float = 0.0
-    beside: float = 0.0
-    fading: float = 0.0
-    taken: float = 0.0
     depth: float = 0.0
     corner: float = 0.0
     measured: float = np.inf
@@ -114,6 +111,16 @@ class SiteError:
     def depth_error(self) -> float:
         """Standard deviation of the largest depth."""
         return float(np.sqrt(sum(share.depth**2 for _, share in self.shares)))
+
+    @property
+    def low(self) -> float:
+        """By how much the volume may be smaller beyond its deviations."""
+        return sum(share.low for _, share in self.shares)
+
+    @property
+    def high(self) -> float:
+        """By how much the volume may be larger beyond its deviations."""
+        return sum(share.high for _, share in self.shares)
 
     def measure_terms(self) -> dict[str, float]:
         """The standard deviation of the volume by each term."""
@@ -146,13 +153,13 @@ def combine_total(volume: float, errors: Sequence[SiteError], doubtful: float = 
         return volume, volume + doubtful
     variances = [(term, sum_variance(term, each)) for term, each in gather_shares(errors)]
     deviation = float(np.sqrt(sum(variance for _, variance in variances)))
-    more = sum(one.inside + one.beside + one.fading + one.taken for one in errors)
+    more = sum(one.high for one in errors)
     free = sum_free(errors)
     middle = volume - sum(one.excess for one in errors)
     of_surface = sum(variance for term, variance in variances if term.is_of_surface)
     own = WIDTH * float(np.sqrt(of_surface)) + max(volume - middle, 0.0)
     taken = margin * (volume - min(middle - WIDTH * deviation, volume) - free[0])
-    low = volume - _limit_taken(errors, taken, min(margin * own, taken)) - sum(one.less for one in errors)
+    low = volume - _limit_taken(errors, taken, min(margin * own, taken)) - sum(one.low for one in errors)
     high = max(middle + WIDTH * deviation, volume) + free[1] + more
     return max(low, 0.0), high + doubtful
 

@@ -6,26 +6,20 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from damageest.artefacts import AdaptedPart, Flags, Floats, FreeMotion, Solid
+from damageest.artefacts import Flags, Floats, FreeMotion, Solid
 from damageest.errors import StageError, clean_message, is_interrupt
-from damageest.findings import Coverage
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.skin import take_inner_surface
 from damageest.isolation import at_work
-from damageest.trust.interval.inner_surface import DEPTH_GAP, DEPTH_NOISE, GAP
+from damageest.trust.interval.inner_surface import DEPTH_GAP, DEPTH_NOISE
 from damageest.trust.interval.loss import LossCase
 from damageest.trust.interval.site_error import WIDTH, Share, SiteError, Term
-from damageest.trust.skin.unseen_rim import find_unseen_beside
 
-HOLE = 0.5
-"""Depth that a hole in the scan of an inner surface may hide, in square roots of its area."""
 NOISY, SLOPE = 3.0, 0.7
 """By how many standard deviations of their noise the deepest of many points is deeper than those around it where it
 lies in no corner of the inner surface; and the share of what it is deeper by, by which a corner goes beyond it: these
 points are two gaps away, the deepest about one."""
-BESIDE = 10.0
-"""Distance from a damage volume, in tolerances, up to which what a field made thinner may be the same wear."""
 PLACES = 500
 """Places on the skin at which the depth of a site is measured."""
 QUANTILES = np.linspace(0.01, 0.99, 50)
@@ -41,9 +35,8 @@ def measure_site_error(case: LossCase, terms: Iterable[Term], free: Sequence[Fre
     surface, loss, adapted = case.surface, case.loss, case.adapted
     if surface is None or loss.inner.all():
         return None
-    aligned, part, damage, evidence = case.field.aligned, case.field.part, loss.damage, loss.evidence
+    aligned, part, damage = case.field.aligned, case.field.part, loss.damage
     shares = tuple((term, share) for term in terms if (share := measure_term(term, case)) is not None)
-    hole = evidence.ids_gap if evidence.ids_gap > GAP * max(case.tolerance, aligned.spacing) ** 2 else 0.0
     rates = case.bent[0][-1:] if adapted is not None and adapted.other is not None else np.empty(0)
     if adapted is not None and adapted.growth:  # of the part, or of the scan's scale: then the loss is of another size
         rates = np.append(rates, damage.volume * ((1 + adapted.growth) ** -3 - 1))
@@ -58,10 +51,7 @@ def measure_site_error(case: LossCase, terms: Iterable[Term], free: Sequence[Fre
         excess=surface.excess,
         rates=rates,
         motions=np.tile([0.0, 1.0], (len(rates), 1)),
-        inside=HOLE * hole**1.5 + loss.beyond.short,
-        less=damage.volume * evidence.ids_unseen if hole else 0.0,
-        taken=measure_lowered(adapted, damage, BESIDE * case.tolerance),
-        depth=deepest.depth - surface.depth_excess,
+        depth=case.depth,
         corner=corner,
         measured=deepest.measured + WIDTH * by_point + corner,
         depth_free=sum(
@@ -97,28 +87,3 @@ def _measure_depths(damage: Solid, inner: Flags) -> Floats:
     """Quantiles of how deep a loss is below places all over the skin that it removes."""
     places, _ = sample_by_area(damage, PLACES, np.random.default_rng(0), np.flatnonzero(~inner))
     return np.asarray(np.quantile(distance_to_mesh(places, take_inner_surface(damage, inner)), QUANTILES))
-
-
-def measure_lowered(adapted: AdaptedPart | None, damage: Solid, reach: float) -> float:
-    """Volume that the field of an adapted part took off beneath a damage volume and within ``reach`` of it, where a
-    field that hardly strains the metal leaves it: wear would look the same."""
-    if adapted is None or adapted.lowered is None or not adapted.lowered.any():
-        return 0.0
-    part = adapted.part
-    depth = adapted.lowered[part.faces].mean(axis=1)
-    some = np.flatnonzero(depth > 0)
-    centres = part.triangles[some].mean(axis=1)
-    near = ((centres > damage.bounds[0] - reach) & (centres < damage.bounds[1] + reach)).all(axis=1)
-    some, centres = some[near], centres[near]
-    if not len(some):
-        return 0.0
-    own = some[distance_to_mesh(centres, damage) < reach]
-    return float(depth[own] @ part.face_areas[own])
-
-
-def limit_beside(coverage: Coverage, damage: Solid, inner: Flags, reach: float, depth: float) -> float:
-    """By how much a loss may be larger where skin beside it, within ``reach``, is not seen: over all of that region, as
-    deep as it is itself, ``depth``. ``inner`` (F,): which of its faces are inside the part."""
-    touched = np.unique(coverage.region[find_unseen_beside(coverage, damage, inner, reach)])
-    regions = [coverage.unseen[number] for number in touched]
-    return float(sum(min(one.volume, one.area * depth) for one in regions))
