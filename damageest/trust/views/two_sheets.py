@@ -57,7 +57,7 @@ flanks; of 20 misplaced views 0.012 to 0.32, but for three that overlap little."
 EXPLAINED = 2.5
 """Depth of a site, in distances of the two surfaces, up to which the misplaced view explains it: where only one view
 shows the skin, it lies too deep by more than it does across the view where both show it."""
-MOST_COMPARED = 1_000_000
+MOST_COMPARED = 300_000
 """Points of a scan, chosen at random, among which these are asked: two surfaces are two in few points as well."""
 
 
@@ -99,10 +99,10 @@ def measure_two_sheets(field: ScanField, members: Ints, damage: Solid | None = N
     tolerance, points = field.tolerance, field.points
     margin = 3 * tolerance + 3 * field.aligned.spacing
     low, high = points[members].min(axis=0) - margin, points[members].max(axis=0) + margin
-    near = find_in_box(points, low, high)
+    thinned, near = _take_some(field, find_in_box(points, low, high), np.random.default_rng(0))
     step = max(1, len(members) // MOST_ASKED)
     asked = members[::step]
-    is_double, upper, apart = _find_double(field, asked, near)
+    is_double, upper, apart = _find_double(thinned, asked, near)
     is_double &= upper < ON_SKIN * tolerance
     if damage is not None:
         walls = is_double & (apart > WALL * tolerance)
@@ -130,17 +130,23 @@ def find_sheets(field: ScanField) -> SheetPlaces:
     nothing = np.empty(0)
     if len(near) < NEIGHBOURS:
         return SheetPlaces(Sheets(), near[:0], nothing, nothing)
-    rng, spacing = np.random.default_rng(0), field.aligned.spacing
-    if len(near) > MOST_COMPARED:
-        share = MOST_COMPARED / len(near)
-        near, spacing = near[rng.random(len(near)) < share], spacing / np.sqrt(share)
+    rng = np.random.default_rng(0)
+    thinned, near = _take_some(field, near, rng)
     asked = rng.permutation(near)[:ALL_ASKED]
-    thinned = replace(field, aligned=replace(field.aligned, spacing=float(spacing)))
     is_double, upper, apart = _find_double(thinned, asked, near)
     if not is_double.any():
         return SheetPlaces(Sheets(), near[:0], nothing, nothing)
     sheets = Sheets(float(is_double.mean()), float(np.quantile(apart[is_double], 0.9)))
     return SheetPlaces(sheets, asked[is_double], upper[is_double], apart[is_double])
+
+
+def _take_some(field: ScanField, near: Ints, rng: np.random.Generator) -> tuple[ScanField, Ints]:
+    """At most about `MOST_COMPARED` of the points ``near`` (N,), and the field with the spacing that they have."""
+    if len(near) <= MOST_COMPARED:
+        return field, near
+    share = MOST_COMPARED / len(near)
+    spacing = float(field.aligned.spacing / np.sqrt(share))
+    return replace(field, aligned=replace(field.aligned, spacing=spacing)), near[rng.random(len(near)) < share]
 
 
 def _find_double(field: ScanField, asked: Ints, near: Ints) -> tuple[Flags, Floats, Floats]:
