@@ -88,6 +88,10 @@ def _measure_size(points: Floats, clip: float) -> float:
     return float((high - low).max())
 
 
+CLEAR = 0.7
+"""Ratio of the sizes of scan and part, after the unit is set right, above which the unit alone explains them."""
+
+
 def diagnose_scale(
     scan_points: Floats,
     part_vertices: Floats,
@@ -146,9 +150,10 @@ def diagnose_scale(
             f"the scan's size is {apart}, and no wrong unit explains it; "
             f"check that the scan is of this part; {piece if ratio < 1 else crop}"
         )
+    more = "; or the scan shows more than the part: crop it" if ratio > largest and ratio / best[1] < CLEAR else ""
     return (
-        f"the scan's size is {apart}: one of the two was probably read in the wrong unit, which makes it "
-        f"{_format_ratio(best[1])} the other's; {best[2]}; or part and scan are swapped"
+        f"the scan's size is {apart}: one of the two was {'perhaps' if more else 'probably'} read in the wrong unit, "
+        f"which makes it {_format_ratio(best[1])} the other's; {best[2]}{more}; or part and scan are swapped"
     )
 
 

@@ -108,6 +108,13 @@ def test_sizes_that_no_unit_explains_are_said_not_to_fit():
     assert "crop the scan" in said
 
 
+@pytest.mark.parametrize(("times", "crop"), [(4.8, True), (10, False), (25.4, False), (1000, False)])
+def test_a_scan_with_its_surroundings_is_not_taken_for_a_wrong_unit(times, crop):
+    said = diagnose_scale(scanned("block") * times, PARTS["block"].vertices)
+    assert said is not None
+    assert ("or the scan shows more than the part: crop it" in said) == crop
+
+
 def test_a_piece_of_the_part_needs_its_pose():
     points = scanned("block") / 3.9
     said = diagnose_scale(points, PARTS["block"].vertices)
