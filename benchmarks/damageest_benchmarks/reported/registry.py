@@ -85,7 +85,7 @@ REPORTS: tuple[Reported, ...] = (
     _hub("jzhzhang/ROSEFusion/issues/14", "drift round the part", sensors.drift_round_the_part, "either"),
     _hub("realsenseai/librealsense/issues/4939", "planes as bowls", sensors.planes_as_bowls, "either"),
     _hub("ifm/ifm3d/issues/118", "mirrored below the floor", sensors.mirrored_below_the_floor, "right"),
-    _hub("realsenseai/librealsense/issues/12887", "edges too shallow", sensors.edges_too_shallow, "said"),
+    _hub("realsenseai/librealsense/issues/12887", "edges too shallow", sensors.edges_too_shallow, "either"),
     _hub("ifm/ifm3d/issues/232", "light between walls", sensors.light_between_walls, "either"),
     Reported("www.mdpi.com/1996-1944/16/18/6165", "spray layer", sensors.spray_layer, "right"),
     Reported(
