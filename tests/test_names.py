@@ -34,7 +34,7 @@ ALIKE = {
     "coverage.py", "scanner.py", "sensor.py", "surplus.py", "uncertainty.py", "verdicts.py",  # the measure, its step
     "beyond_points.py", "fading.py", "free_pose.py", "inner_surface.py", "other_method.py",
     "two_sheets.py",  # the measure of a doubt, its rule
-    "adapt.py", "form.py", "noise.py", "pose.py", "views.py",  # a cause, its term of the interval
+    "adapt.py", "beside.py", "form.py", "noise.py", "pose.py", "views.py",  # a cause, its term of the interval
     "schema.py", "reference.py", "page.py", "run.py", "polygons.py", "pieces.py",
 }  # fmt: skip
 """Files of the core that have one name in two rooms, in one sense."""
