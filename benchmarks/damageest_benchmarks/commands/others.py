@@ -54,7 +54,7 @@ def reported(
     write: Write = None,
     as_json: AsJson = False,
 ) -> None:
-    """Run what users of other tools report in public, made anew with known truth.
+    """Run what users of other tools report in public, with known truth.
 
     Scans that were filtered, filled, smoothed or doubled, sensors that are wrong, models that are coarse or inside out.
     """
