@@ -139,6 +139,30 @@ def test_a_stage_that_misbehaves_is_named(body: str, text: str, site: Site, tiny
     assert text in result.failures[0]
 
 
+PLANNER = """
+from damageest.stages.path import Path
+
+class Stuck(Path):
+    \"\"\"Plans nothing.\"\"\"
+    use: Literal["stuck"] = "stuck"
+
+    def run(self, body):
+        raise ValueError("no way out")
+
+@hookimpl
+def damageest_stages():
+    return [Stuck]
+"""
+
+
+def test_a_path_that_cannot_be_planned_leaves_the_interval_of_the_total(site: Site, tiny_done: Path) -> None:
+    site.add("acme-path", PLANNER)
+    result = damageest.run(tiny_done, settings=["path=stuck"])
+    assert "no way out" in result.failures[0]
+    assert result.volume_95 is not None
+    assert result.volume_95[0] < result.damage_volume < result.volume_95[1]
+
+
 class Observer:
     def __init__(self) -> None:
         self.seen: list[tuple[str, str]] = []

@@ -19,6 +19,7 @@ from damageest.pipeline.state import FoundSite, JobState
 from damageest.pipeline.steps import step
 from damageest.stages.adapt import Adapt
 from damageest.stages.allowance import Allowance
+from damageest.stages.path import Path
 from damageest.trust.beyond_points import measure_beyond_points
 from damageest.trust.doubts.dent import find_bent_wall
 from damageest.trust.interval.budget import make_depth_budget, make_volume_budget
@@ -110,7 +111,7 @@ def _sum_volume(state: JobState, hidden: float) -> Interval | None:
             return None
         shallow = limit_shallow_loss(field, state.sensor.least_width)
         return 0.0, measure_hidden_wear(field.part, pose) + hidden + shallow
-    lost = [error for error in failures if error.stage != Allowance.stage]
+    lost = [error for error in failures if error.stage not in (Allowance.stage, Path.stage)]  # these come after the loss
     taken = [site for site in found if site.accepted]
     errors = [site.error for site in taken if site.error is not None]
     if len(errors) != len(taken) or lost:
