@@ -362,7 +362,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
 """What is called, by module and name; it checks the shapes of what comes back."""
 
 WITHOUT_ROWS: dict[str, str] = {
-    "tools.place_tool": "takes one point",
+    "nozzle.place_tool": "takes one point",
     "transforms.turn_to_axis": "takes one vector",
     **dict.fromkeys(
         (

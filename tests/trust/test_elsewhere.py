@@ -28,7 +28,7 @@ def measure(sound: float) -> float:
     deviation = Deviation(distance, face, label)
     scan = Scan(points, noise=0.03, spacing=0.6)
     field = ScanField(part, scan, deviation, TOLERANCE)
-    skin, _ = inspect_skin(field, None)
+    skin, *_ = inspect_skin(field, None)
     cells = skin.cells
     removed = (cells.normals[:, 2] > 0.9) & (np.abs(cells.centres[:, 0]) < (1 - sound) * X)
     members = np.flatnonzero(label == DAMAGE)
