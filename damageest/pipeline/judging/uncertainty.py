@@ -111,7 +111,8 @@ def _sum_volume(state: JobState, hidden: float) -> Interval | None:
             return None
         shallow = limit_shallow_loss(field, state.sensor.least_width)
         return 0.0, measure_hidden_wear(field.part, pose) + hidden + shallow
-    lost = [error for error in failures if error.stage not in (Allowance.stage, Path.stage)]  # these come after the loss
+    after = (Allowance.stage, Path.stage)  # they change no loss
+    lost = [error for error in failures if error.stage not in after]
     taken = [site for site in found if site.accepted]
     errors = [site.error for site in taken if site.error is not None]
     if len(errors) != len(taken) or lost:
