@@ -56,7 +56,8 @@ def reported(
 ) -> None:
     """Run what users of other tools report in public.
 
-    Made anew with known truth: scans that were filtered, filled, smoothed or doubled, sensors that are wrong, models that are coarse or inside out.
+    Made anew with known truth: scans that were filtered, filled, smoothed or doubled, sensors that are wrong, models
+    that are coarse or inside out.
     """
     from damageest_evaluate.commands.counted import run_counted, show_table
     from damageest_evaluate.job import fingerprint_code
