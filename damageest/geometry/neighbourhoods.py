@@ -97,6 +97,16 @@ def pick_one_per_cube(points: Floats, cell: float) -> Ints:
     return np.sort(group_integers(number_cubes(points, cell)[1])[0])
 
 
+def pick_at_most(points: Floats, cell: float, most: int, growth: float) -> Ints:
+    """As `pick_one_per_cube`, in cubes whose edge grows from ``cell`` by the factor ``growth`` until ``most`` points
+    are left at most."""
+    chosen = pick_one_per_cube(points, cell)
+    while len(chosen) > most:
+        cell *= growth
+        chosen = pick_one_per_cube(points, cell)
+    return chosen
+
+
 def find_neighbours(
     points: Floats, count: int, among: Floats | None = None, reach: float = np.inf
 ) -> tuple[Floats, Ints]:

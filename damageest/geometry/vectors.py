@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import Floats
+from damageest.artefacts import Floats, Vector
 
 
 def cross_corners(corners: Floats) -> Floats:
     """(F,3) normals of triangles with ``corners`` (F,3,3), scaled by twice the area."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+
+
+def to_vector(values: Floats) -> Vector:
+    """Three numbers (3,) as a tuple."""
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def normalise(vectors: Floats, least: float = 1e-300) -> Floats:

@@ -10,6 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats, Ints, Vector
 from damageest.geometry.solids import to_manifold
+from damageest.geometry.vectors import to_vector
 from damageest.inspection.aim import Aim, cut_volume
 from damageest.inspection.places import Landed
 from damageest.result import Result
@@ -103,9 +104,3 @@ def _find_sites(of: Ints, distance: Floats, tolerance: float) -> tuple[int, ...]
     least = dict.fromkeys(order, FEWEST)
     least[ELSEWHERE] = max(FEWEST, int(np.ceil(BESIDE * len(of))))
     return tuple(number for number in order if counts[number] >= least[number]) or tuple(order[:1]) or (ELSEWHERE,)
-
-
-def to_vector(values: Floats) -> Vector:
-    """Three numbers as a tuple."""
-    x, y, z = values.tolist()
-    return x, y, z

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from damageest.artefacts import Flags, Ints
-from damageest.inspection.discrepancies import Finding, to_vector
+from damageest.geometry.vectors import to_vector
+from damageest.inspection.discrepancies import Finding
 from damageest.inspection.places import Landed, Places
 from damageest.result import Result
 

@@ -37,10 +37,8 @@ class ExtrapolationReport(JsonModel):
     deviation: float = Field(description="largest standard deviation of the adapted skin there, along its normal")
 
 
-class PriorReport(JsonModel, of=PriorUse, fields="used parts misfit limit"):
+class PriorReport(JsonModel, of=PriorUse, fields="used=is_used parts misfit limit"):
     """Prediction by the job's other parts of the type."""
-
-    used: bool = Field(description="whether they predicted lost skin; false: this part deforms in another way")
 
 
 class AdaptReport(

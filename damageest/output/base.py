@@ -23,8 +23,8 @@ class JsonModel(BaseModel):
 
     ``class SomeReport(JsonModel, of=Some)`` has the fields of the dataclass ``Some``, but for those of ``without``: in
     its order, with its types and the texts of its ``Annotated``, and without its defaults. ``fields``: names of those
-    that it has, and of properties of ``Some``, in the order of JSON. An annotation in the class itself replaces a
-    field's type or a property, or adds a field.
+    that it has, and of properties of ``Some``, in the order of JSON; ``held=is_held``: another name in JSON. An
+    annotation in the class itself replaces a field's type or a property, or adds a field.
     """
 
     model_config = ConfigDict(extra="forbid", populate_by_name=True, defer_build=True, from_attributes=True)
@@ -37,7 +37,10 @@ class JsonModel(BaseModel):
             own = inspect.get_annotations(cls)
             hints = typing.get_type_hints(of, include_extras=True)
             names = fields.split() or [name for name in hints if name not in without]
-            cls.__annotations__ = {name: _derive_field(of, name, hints, own.pop(name, None)) for name in names} | own
+            pairs = [(name, source or name) for name, _, source in (one.partition("=") for one in names)]
+            cls.__annotations__ = {
+                name: _derive_field(of, source, hints, own.pop(name, None)) for name, source in pairs
+            } | own
             _MODELS.setdefault(of, cls)
 
     @field_validator("*", mode="before")

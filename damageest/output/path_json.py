@@ -25,7 +25,8 @@ class PathReport(
     JsonModel,
     of=DepositPath,
     fields="passes layers layer_form directions layer_heights length travel minutes wait_minutes bead_volume "
-    "deposit_volume surplus_volume unreachable_volume unreached clearance travel_clearance setup fill files notes",
+    "deposit_volume surplus_volume unreachable_volume=unreached_volume unreached clearance travel_clearance setup "
+    "fill files notes",
 ):
     """The passes that build up the deposit. Times are those of the feeds, without acceleration."""
 
@@ -33,7 +34,6 @@ class PathReport(
     directions: list[Vector] = Field(description="build direction of each part of the deposit")
     layer_heights: list[float] = Field(description="height of the layers in each part of the deposit")
     minutes: float
-    unreachable_volume: float = Field(description="volume of the deposit that no pass fills")
     clearance: Bound
     travel_clearance: Bound
     setup: list[list[float]] | None

@@ -32,7 +32,8 @@ class RescaledReport(JsonModel):
 class AlignmentReport(
     JsonModel,
     of=Pose,
-    fields="transform quaternion translation rms inliers alternatives notes doubts free datums left held rescaled",
+    fields="transform quaternion translation rms inliers alternatives notes doubts free datums left held=is_held "
+    "rescaled",
 ):
     transform: Matrix = Field(description="T_part_scan, 4x4: from the scanner's frame to the part's")
     quaternion: tuple[float, float, float, float] = Field(
@@ -41,7 +42,6 @@ class AlignmentReport(
     translation: Vector = Field(description="shift, after the rotation")
     alternatives: list[Matrix]
     left: list[LeftMotionReport]
-    held: bool = Field(description="whether unworn skin fixes all other motions")
     rescaled: RescaledReport | None = Field(
         None,
         description="only where the lengths of the scan were corrected: a raw point x is at "

@@ -19,6 +19,7 @@ from damageest.geometry.neighbourhoods import find_in_box, find_neighbours
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.scan_field import ScanField
 from damageest.geometry.skin import find_inner_faces, take_lost_skin
+from damageest.geometry.vectors import to_vector
 
 ASKED, CONTRADICTED = 0.01, 0.03
 """Share of the volume that no point shows, above which it is reported, and above which it contradicts the volume.
@@ -95,7 +96,7 @@ def measure_beyond_points(solid: Solid, field: ScanField, own: Floats, unit: str
             "bulges without scan points"
         )
     elif share > ASKED:
-        x, y, z = at = _to_tuple(places[behind.argmax()])
+        x, y, z = at = to_vector(places[behind.argmax()])
         reason = (
             f"its surface bulges by {amount:.3g} {unit}³ ({share:.1%}), up to {behind.max():.3g} {unit} near "
             f"({x:.4g}, {y:.4g}, {z:.4g}), between points that are {gap:.3g} {unit} apart"
@@ -119,11 +120,6 @@ def _compare_with_points(
     lowest = np.where(is_near, height, np.inf).min(axis=1)
     before = np.where(is_near.all(axis=1), -np.median(height, axis=1), 0.0)
     return places, np.where(is_near[:, 0], lowest, 0.0), before, float((distance[:, 0] > far).mean())
-
-
-def _to_tuple(place: Floats) -> Vector:
-    x, y, z = place.tolist()
-    return x, y, z
 
 
 def _measure_hollow(solid: Solid, skin: Flags) -> float:

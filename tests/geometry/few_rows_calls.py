@@ -243,6 +243,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
     "neighbourhoods.thin_points": lambda r: expect(
         neighbourhoods.thin_points(r.points, 0.1), (None, 3), (None,), (None,)
     ),
+    "neighbourhoods.pick_at_most": lambda r: expect(neighbourhoods.pick_at_most(r.points, 0.1, 5, 2.0), (None,)),
     "neighbourhoods.pick_one_per_cube": lambda r: expect(neighbourhoods.pick_one_per_cube(r.points, 0.1), (None,)),
     "neighbourhoods.find_neighbours": call_neighbours,
     "neighbourhoods.make_tree": call_query,
@@ -364,6 +365,7 @@ CALLS: dict[str, Callable[[Rows], None]] = {
 WITHOUT_ROWS: dict[str, str] = {
     "nozzle.place_tool": "takes one point",
     "transforms.turn_to_axis": "takes one vector",
+    "vectors.to_vector": "takes one vector",
     **dict.fromkeys(
         (
             "alike.have_same_shape", "alike.measure_radii",

@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 from damageest_evaluate.processes import Row
 
-from damageest.errors import InputError
+from damageest.errors import InputError, describe_error
 from damageest_benchmarks.families.case import run_draw
 from damageest_benchmarks.reported.registry import REPORTS, Reported
 
@@ -44,7 +44,7 @@ class ReportedCase:
         try:
             draw = self.report.make()
         except InputError as error:  # the file itself is refused
-            message = " ".join(str(error).split())[:300]
+            message = describe_error(error, 300)
             judged = {"outcome": "said", "refused": True, "reason": f"refused: {message}", "error": message}
             return self.make_blank_row() | judged | {"seconds": time.perf_counter() - start}
         return run_draw(draw, self.make_blank_row())

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Mesh, Scan
 from damageest.geometry.distance import distance_to_mesh
+from damageest.geometry.loops import trace_loops
 from damageest.geometry.rays import RayCaster
 from damageest.geometry.sampling import sample_by_area
 from damageest.geometry.solids import to_arrays, to_manifold
@@ -140,14 +141,9 @@ def pit_under_a_lid() -> Draw:
     fine = refine(bench.left, 0.012 * part.diagonal)
     middle = fine.triangles.mean(axis=1)
     faces = fine.faces[distance_to_mesh(middle, part) < 1e-3 * part.diagonal]
-    edges = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]])
-    there = {tuple(edge) for edge in edges.tolist()}
-    follow = {b: a for a, b in there if (b, a) not in there}
-    ring = [next(iter(follow))]
-    while len(ring) < len(follow):
-        ring.append(follow[ring[-1]])
-    corners = np.array(ring)
-    lid = np.column_stack([np.full(len(ring) - 2, corners[0]), corners[1:-1], corners[2:]])
+    (rim,) = trace_loops(faces)
+    corners = rim[::-1]
+    lid = np.column_stack([np.full(len(corners) - 2, corners[0]), corners[1:-1], corners[2:]])
     used, number = np.unique(np.concatenate([faces, lid]), return_inverse=True)
     return bench.finish_mesh(Mesh(bench.blur(fine.vertices[used]), number.reshape(-1, 3)))
 

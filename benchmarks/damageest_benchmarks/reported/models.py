@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Mesh, Part
-from damageest.geometry.solids import to_arrays, to_manifold, to_solid
+from damageest.geometry.solids import to_arrays, to_solid
 from damageest.io.meshes import write_stl
 from damageest.io.parts import read_part
 from damageest_benchmarks.families.scene import Draw, to_part
@@ -88,8 +88,3 @@ def model_not_closed() -> Draw:
     bench = take("block", 84)
     draw = bench.finish(bench.scan()[0])
     return replace(draw, part=_read_again(Mesh(bench.part.vertices, bench.part.faces[:-3])))
-
-
-def volume_of(draw: Draw) -> float:
-    """The true volume that is lost."""
-    return 0.0 if draw.damage is None else float(to_manifold(draw.damage).volume())

@@ -6,7 +6,7 @@ import numpy as np
 
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.local_fits import average_points
-from damageest.geometry.neighbourhoods import measure_local_areas, pick_one_per_cube, thin_points
+from damageest.geometry.neighbourhoods import measure_local_areas, pick_at_most, pick_one_per_cube, thin_points
 from damageest.geometry.orientation import turn_toward_void
 from damageest.geometry.patches import Patches
 from damageest.stages.enclose._fill_gaps import fill_gaps
@@ -43,10 +43,7 @@ def build_surface(
     chosen = _thin_flat(points, chosen, counts, depth[first], noise, cell)
     above, depth = above[first][chosen], depth[first][chosen]
     points, normals = average_points(points, counts, noise, chosen)
-    size, chosen = cell, np.arange(len(lost))
-    while len(chosen) > MOST_LOST:
-        size *= 1.3
-        chosen = pick_one_per_cube(lost, size)
+    chosen = np.arange(len(lost)) if len(lost) <= MOST_LOST else pick_at_most(lost, 1.3 * cell, MOST_LOST, 1.3)
     places = lost[chosen]
     normals = turn_toward_void(points, normals, above, places, lost_normals[chosen], measure_local_areas(places), cell)
     points, normals = fill_gaps(points, normals, depth, cell)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from damageest.artefacts import INTACT, Flags, Floats, Ints, Part
+from damageest.artefacts import INTACT, Flags, Floats, Part
 from damageest.geometry.local_fits import smooth_points
-from damageest.geometry.neighbourhoods import find_neighbours, pick_one_per_cube
+from damageest.geometry.neighbourhoods import find_neighbours, pick_at_most, pick_one_per_cube
 from damageest.geometry.orientation import find_signs
 from damageest.geometry.rays import prepare_rays
 from damageest.geometry.scan_field import ScanField
@@ -53,7 +53,7 @@ def find_behind(field: ScanField, damaged: DamagedPoints, skin: SkinSamples) -> 
     rim = rim[pick_one_per_cube(aligned.points[rim], 0.5 * cell)] if len(rim) else rim
     if len(rim) < FEWEST:
         return behind
-    few = _pick_few(damaged.points, 0.5 * cell)
+    few = pick_at_most(damaged.points, 0.5 * cell, MOST, 2.0)
     own = damaged.points[few]
     points = np.concatenate([own, aligned.points[rim]])
     points, normals, _ = smooth_points(points, aligned.noise, min(FIT_COUNT, len(points) // 2))
@@ -78,15 +78,6 @@ def find_behind(field: ScanField, damaged: DamagedPoints, skin: SkinSamples) -> 
     share = np.bincount(site, is_behind) / np.maximum(np.bincount(site), 1)
     behind[asked] = is_behind & (share[site] > LEAST_SHARE)
     return behind
-
-
-def _pick_few(points: Floats, cell: float) -> Ints:
-    """Indices of one of the points (N,3) in each cube of edge ``cell``, or of larger cubes where those are too many."""
-    few = pick_one_per_cube(points, cell)
-    while len(few) > MOST:
-        cell *= 2
-        few = few[pick_one_per_cube(points[few], cell)]
-    return few
 
 
 def _measure_walls(part: Part, skin: Floats, normals: Floats) -> Floats:

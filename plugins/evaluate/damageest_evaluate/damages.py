@@ -12,7 +12,7 @@ import numpy as np
 from damageest.artefacts import Floats, Part, Solid
 from damageest.errors import StageError
 from damageest.geometry.solids import to_manifold
-from damageest.geometry.vectors import normalise
+from damageest.geometry.vectors import normalise, to_vector
 from damageest.stages.scan.scanner import apply_tools
 from damageest.stages.scan.tools import BlobTool, BoxTool, CylinderTool, PlaneTool, SphereTool, Tool
 from damageest_evaluate.scores import measure_depth, sample_surface
@@ -89,16 +89,11 @@ class PlacePicker:
         return self._measure_reach(1)
 
 
-def _to_tuple(point: Floats) -> tuple[float, float, float]:
-    x, y, z = (float(value) for value in point)
-    return x, y, z
-
-
 def _make_lump(picker: PlacePicker, centre: Floats, radius: float) -> Tool:
     """A ball or a blob."""
     if picker.rng.random() < 0.3:
-        return SphereTool(centre=_to_tuple(centre), radius=radius)
-    return BlobTool(centre=_to_tuple(centre), radius=radius, seed=picker.draw_seed())
+        return SphereTool(centre=to_vector(centre), radius=radius)
+    return BlobTool(centre=to_vector(centre), radius=radius, seed=picker.draw_seed())
 
 
 def make_chip(picker: PlacePicker) -> list[Tool]:
@@ -112,8 +107,8 @@ def make_chip(picker: PlacePicker) -> list[Tool]:
     rough = picker.size * picker.draw(0.0005, 0.003)
     return [
         PlaneTool(
-            point=_to_tuple(point - depth * tilt),
-            normal=_to_tuple(tilt),
+            point=to_vector(point - depth * tilt),
+            normal=to_vector(tilt),
             within=within,
             roughness=rough,
             seed=picker.draw_seed(),
@@ -135,7 +130,7 @@ def make_cut(picker: PlacePicker) -> list[Tool]:
     rough = picker.size * picker.draw(0.0005, 0.002) if picker.rng.random() < 0.4 else 0.0
     return [
         BoxTool(
-            centre=_to_tuple(point),
+            centre=to_vector(point),
             size=(float(a), float(b), float(c)),
             rotation=picker.draw_rotation() if picker.rng.random() < 0.6 else (0.0, 0.0, 0.0),
             roughness=rough,
@@ -157,13 +152,13 @@ def break_off_end(picker: PlacePicker) -> list[Tool]:
     low, high = -picker.size, picker.size
     for _ in range(40):
         offset = (low + high) / 2
-        taken = body.trim_by_plane(_to_tuple(normal), offset).volume()
+        taken = body.trim_by_plane(to_vector(normal), offset).volume()
         low, high = (offset, high) if taken > wanted else (low, offset)
     rough = picker.size * picker.draw(0, 0.004)
     return [
         PlaneTool(
-            point=_to_tuple(origin + offset * normal),
-            normal=_to_tuple(normal),
+            point=to_vector(origin + offset * normal),
+            normal=to_vector(normal),
             roughness=rough,
             seed=picker.draw_seed(),
         )
@@ -178,7 +173,7 @@ def make_hole(picker: PlacePicker) -> list[Tool]:
     radius = picker.size * picker.draw(0.025, 0.06)
     back = 0.05 * picker.size
     return [
-        CylinderTool(point=_to_tuple(point - back * axis), axis=_to_tuple(axis), radius=radius, length=3 * picker.size)
+        CylinderTool(point=to_vector(point - back * axis), axis=to_vector(axis), radius=radius, length=3 * picker.size)
     ]
 
 
@@ -204,7 +199,7 @@ def make_groove(picker: PlacePicker) -> list[Tool]:
 
     turn = Rotation.from_matrix(np.column_stack([along, np.cross(normal, along), normal])).as_euler("xyz", degrees=True)
     size = (picker.size * picker.draw(0.25, 0.7), width, 2 * depth)
-    return [BoxTool(centre=_to_tuple(point), size=size, rotation=_to_tuple(turn))]
+    return [BoxTool(centre=to_vector(point), size=size, rotation=to_vector(turn))]
 
 
 def make_damage_beside_gap(picker: PlacePicker) -> list[Tool]:
