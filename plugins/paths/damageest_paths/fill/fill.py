@@ -10,6 +10,8 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest_paths.fill.joints import round_corners
+from damageest_paths.fill.lines import Line
+from damageest_paths.fill.middles import move_inside
 from damageest_paths.fill.regions import (
     SAME,
     close_ring,
@@ -23,7 +25,7 @@ from damageest_paths.fill.regions import (
 )
 from damageest_paths.fill.stripes import Bead, fill_with_rows
 from damageest_paths.fill.trim import cut_ring, lengthen_line
-from damageest_paths.fill.weave import Line, Pattern, Style, join_all, move_inside, part_lines, weave_piece
+from damageest_paths.fill.weave import Pattern, Style, join_all, part_lines, weave_piece
 
 STYLE = Style()
 SLIVER = 0.04

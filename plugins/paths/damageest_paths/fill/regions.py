@@ -6,6 +6,7 @@ A region is typed Any. Lengths are in the job's unit.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,8 @@ from damageest.artefacts import Flags, Floats, Ints
 
 ROUND = 24
 """Corners of a full circle where a bead's end is drawn as a polygon."""
+TURN = np.radians(15.0)
+"""Turn of a line up to which the border of its bead goes on without a corner of its own."""
 SAME = 0.002
 """Bead widths by which a corner may lie beside a line and be left out where its bead is drawn."""
 RAGGED, EVEN = 0.15, 0.01
@@ -78,8 +81,8 @@ def cover(lines: Sequence[Floats], width: float) -> Any:
     """The region that beads of a width cover whose centre lines are the polylines (K,2). Their ends are round."""
     from manifold3d import CrossSection, FillRule
 
-    outlines = [outline for line in lines for outline in _outline(thin_line(line, SAME * width), width / 2)]
-    return CrossSection(outlines, FillRule.NonZero) if outlines else CrossSection()
+    strips = [strip for line in lines for strip in _list_strips(thin_line(line, SAME * width), width / 2)]
+    return CrossSection(strips, FillRule.NonZero) if strips else CrossSection()
 
 
 def thin_line(line: Floats, off: float) -> Floats:
@@ -106,18 +109,30 @@ def find_corners(count: int, measure_off: Callable[[int, int], Floats], most: fl
     return np.array(sorted(kept))
 
 
-def _outline(line: Floats, radius: float) -> list[Floats]:
-    """A rounded rectangle (ROUND + 2, 2) round each piece of a polyline."""
+def _list_strips(line: Floats, radius: float) -> list[Floats]:
+    """Polygons (K,2) that together are all places up to a radius from a polyline, with round ends. It is cut where it
+    turns sharply, or within a short stretch: elsewhere one polygon follows both of its sides."""
     if len(line) == 1:
         line = np.concatenate([line, line])
-    start, stop = line[:-1], line[1:]
-    along = stop - start
-    angle = np.arctan2(along[:, 1], along[:, 0])
-    half = np.linspace(-np.pi / 2, np.pi / 2, ROUND // 2 + 1)
-    ahead, behind = angle[:, None] + half, angle[:, None] + half + np.pi
-    front = stop[:, None] + radius * np.stack([np.cos(ahead), np.sin(ahead)], axis=2)
-    back = start[:, None] + radius * np.stack([np.cos(behind), np.sin(behind)], axis=2)
-    return list(np.concatenate([front, back], axis=1))
+    sides = np.diff(line, axis=0)
+    long = np.linalg.norm(sides, axis=1)
+    angle = np.arctan2(sides[:, 1], sides[:, 0])
+    turn = np.abs((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi)
+    # where a side is shorter than that, the overlap of two strips inside of the turn reaches beyond it
+    sharp = (turn > TURN) | (np.minimum(long[1:], long[:-1]) < radius * np.tan(np.minimum(turn, TURN)))
+    cuts = [0, *(np.flatnonzero(sharp) + 1).tolist(), len(line) - 1]
+    across = radius * np.column_stack([-np.sin(angle), np.cos(angle)])
+    half = np.linspace(-np.pi / 2, np.pi / 2, ROUND // 2 + 1)[1:-1]
+    found = []
+    for low, high in pairwise(cuts):
+        both = np.stack([line[low:high], line[low + 1 : high + 1]], axis=1)
+        side = across[low:high, None]
+        ahead, behind = angle[high - 1] + half, angle[low] + np.pi + half
+        front = line[high] + radius * np.column_stack([np.cos(ahead), np.sin(ahead)])
+        back = line[low] + radius * np.column_stack([np.cos(behind), np.sin(behind)])
+        left, right = (both + side).reshape(-1, 2), (both - side).reshape(-1, 2)
+        found.append(np.concatenate([right, front, left[::-1], back]))
+    return found
 
 
 def close_ring(ring: Floats) -> Floats:

@@ -13,8 +13,8 @@ from damageest.geometry.solids import to_arrays
 from damageest_paths.clearance.clearance import Clearance
 from damageest_paths.clearance.obstacles import COARSER, Obstacles
 from damageest_paths.fill.fill import list_lines
+from damageest_paths.fill.lines import Line
 from damageest_paths.fill.regions import EVEN, cover, drop_narrow, measure_length, resample, smooth_border
-from damageest_paths.fill.weave import Line
 from damageest_paths.holding.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.holding.reach import turn_reach
 from damageest_paths.holding.shade import measure_shade

@@ -14,6 +14,7 @@ from damageest_paths.clearance.axes import Limits, Piece, choose_axes, list_axes
 from damageest_paths.clearance.clearance import Clearance
 from damageest_paths.clearance.obstacles import Obstacles
 from damageest_paths.fill.fill import SLIVER, WITHIN, list_lines
+from damageest_paths.fill.lines import Kind, Line
 from damageest_paths.fill.regions import (
     cover,
     list_pieces,
@@ -23,7 +24,6 @@ from damageest_paths.fill.regions import (
     shift_border,
     unite_regions,
 )
-from damageest_paths.fill.weave import Kind, Line
 from damageest_paths.holding.reach import is_reached, turn_reach
 from damageest_paths.layering.aims import DOWN, UP, Aims, cast_shadow, find_aims, find_sink, measure_margin
 from damageest_paths.layering.anchor import find_foot

@@ -8,8 +8,9 @@ from typing import Any, Literal
 import numpy as np
 
 from damageest.artefacts import Floats
+from damageest_paths.fill.lines import Kind
 from damageest_paths.fill.stripes import Bead
-from damageest_paths.fill.weave import Kind, Pattern, Style
+from damageest_paths.fill.weave import Pattern, Style
 from damageest_paths.process.frames import Frame
 from damageest_paths.tool.sight import Beam
 

@@ -1,0 +1,80 @@
+"""Spirals: one pass from the border to the middle, whatever the border is like."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from damageest_paths.fill.fill import list_lines
+from damageest_paths.fill.joints import find_reversals
+from damageest_paths.fill.regions import cover, make_region, measure_length
+from damageest_paths.fill.rings import soften
+from damageest_paths.fill.stripes import Bead
+from manifold3d import CrossSection, OpType
+
+from damageest.artefacts import Floats
+
+BEAD = Bead(2.0, 1.4)
+
+
+def ragged(long: float, wide: float) -> Any:
+    """A rectangle with a rough border, as of a scanned floor."""
+    x, y = np.meshgrid([-1.0, 1.0], [-1.0, 1.0])
+    along = np.linspace(0, 1, 40, endpoint=False)
+    corners = np.array([[x[0, 0], y[0, 0]], [x[0, 1], y[0, 1]], [x[1, 1], y[1, 1]], [x[1, 0], y[1, 0]]])
+    ring = np.concatenate([a + along[:, None] * (b - a) for a, b in zip(corners, np.roll(corners, -1, 0), strict=True)])
+    rough = 1 + 0.01 * np.random.default_rng(3).normal(size=(len(ring), 1))
+    return make_region([ring * rough * [long / 2, wide / 2]])
+
+
+@pytest.mark.parametrize("wide", [12.0, 12.7, 13.4, 14.1])
+def test_a_long_region_is_one_spiral_that_ends_in_its_middle(wide: float) -> None:
+    region = ragged(40.0, wide)
+    lines = list_lines(region, "zigzag", BEAD, 0.0)
+    long = [line for line in lines if measure_length(line.points) > 2 * BEAD.width]
+    assert len(long) == 1
+    assert not find_reversals(long[0].points, BEAD.width)
+    assert (region - cover([line.points for line in lines], BEAD.width)).area() < 0.01 * region.area()
+
+
+def count_reversals(region: Any) -> int:
+    rings = [np.asarray(ring) for ring in region.to_polygons()]
+    return sum(len(find_reversals(np.concatenate([ring, ring[:2]]), BEAD.width)) for ring in rings)
+
+
+def test_a_ring_goes_round_a_spike_in_an_arc() -> None:
+    region = CrossSection.square((20, 12))
+    spike = make_region([np.array([[8.8, -3], [11.2, -3], [10, 4]])])
+    inner = soften(region, CrossSection.square((40, 40)).translate((-10, -10)) - spike, BEAD.width)
+    assert count_reversals(region - spike) > 0
+    assert count_reversals(inner) == 0
+    assert (region - spike - inner).area() < 3.0
+
+
+def test_a_ring_leaves_out_a_tip_in_which_it_would_come_back() -> None:
+    tip = make_region([np.array([[0.0, 0], [20, 0], [20, 8], [26, 9], [20, 9.8], [20, 12], [0, 12]])])
+    inner = soften(tip, None, BEAD.width)
+    assert count_reversals(tip) > 0
+    assert count_reversals(inner) == 0
+    assert (tip - inner).area() < 1.0
+
+
+def discs(line: Floats) -> Any:
+    """What a bead covers, as discs close to each other."""
+    length = np.linalg.norm(np.diff(line, axis=0), axis=1)
+    dense = [
+        a + t * (b - a)
+        for a, b, far in zip(line, line[1:], length, strict=False)
+        for t in np.arange(0, 1, 0.02 / max(far, 0.02))
+    ]
+    return CrossSection.batch_boolean([CrossSection.circle(1.0, 48).translate(tuple(p)) for p in dense], OpType.Add)
+
+
+@pytest.mark.parametrize("step", [0.1, 0.5, 2.0])
+def test_a_bead_is_covered_as_its_discs_are(step: float) -> None:
+    line = np.cumsum(np.random.default_rng(7).normal(scale=step, size=(12, 2)), axis=0)
+    drawn, true = cover([line], 2.0), discs(line)
+    thick = 0.012
+    assert (drawn - true.offset(thick)).area() < 1e-3
+    assert (true - drawn.offset(thick)).area() < 1e-3
