@@ -80,7 +80,7 @@ def orient_points(points: Floats, part: Part, cell: float, noise: float) -> tupl
     nothing = np.empty((0, 3))
     # The nearest skin may be that behind a thin wall, so its weight is small: it only decides between the two
     # consistent orientations of all normals.
-    hint = 1e-4 * _find_skin_directions(cloud, part)
+    hint = 1e-6 * _find_skin_directions(cloud, part)
     return cloud, turn_toward_void(cloud, normals, hint, nothing, nothing, np.empty(0), cell)
 
 

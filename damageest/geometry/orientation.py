@@ -14,6 +14,8 @@ from damageest.geometry.voxels import number_cubes
 
 SMOOTH = 0.8
 """Agreement of the normals of two neighbours (0 to 1) above which they belong to one smooth patch."""
+HINT = 0.01
+"""Length of a hint that decides only where no skin is missing."""
 CACHED = 30_000
 """Pairs of a point and a sample of the skin that are computed at a time, so that they stay in the processor's cache."""
 
@@ -31,8 +33,9 @@ def turn_toward_void(
     Args:
         points: (N,3) on the inner damage surface.
         normals: (N,3) unit normals of either sign.
-        above: (N,3) normal of the nominal skin nearest to each point, or another hint of the lost side, up to length
-            1; it decides where no skin is missing.
+        above: (N,3) hint of the lost side, as the normal of the nominal skin nearest to each point. Its length, up to
+            1, is its weight: with 1 it counts as much as skin that is missing all over the point, with `HINT` it
+            decides where no skin is missing.
         lost, lost_normals: (S,3) samples of the missing skin, S may be 0, and its outward normals.
         areas: (S,) the area that each sample stands for, in the square of the points' unit.
         cell: length below which nothing is resolved.
@@ -48,7 +51,7 @@ def turn_toward_void(
         viewpoints, lost, lost_normals, areas, cell
     )
     nearest = cKDTree(viewpoints).query(points, workers=count_threads())[1]
-    evidence = np.einsum("ij,ij->i", normals, toward_lost[nearest] / np.pi + 0.01 * above)
+    evidence = np.einsum("ij,ij->i", normals, toward_lost[nearest] / np.pi + above)
     return find_signs(points, normals, evidence)[:, None] * normals
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -17,8 +19,8 @@ TOLERANCE, NOISE = 0.2, 0.05
 TOP = SIZE[2] / 2
 
 
-def scan_box(seed: int, *tools: dict[str, object], points: int = 20_000) -> Floats:
-    scanner = Simulate.model_validate({"damage": list(tools), "points": points, "noise": NOISE, "seed": seed})
+def scan_box(seed: int, *tools: dict[str, object], points: int = 20_000, noise: float = NOISE) -> Floats:
+    scanner = Simulate.model_validate({"damage": list(tools), "points": points, "noise": noise, "seed": seed})
     return np.array(scanner.run("mm", box()).points)
 
 
@@ -91,3 +93,13 @@ def test_a_false_site_of_a_misplaced_view_is_doubtful_and_names_the_cause() -> N
     assert result.sites
     assert not any(site.accepted for site in result.sites)
     assert "two_sheets" in {reason.code for site in result.sites for reason in site.verdict.reasons}
+
+
+def test_a_waved_face_between_sparse_points_is_one_surface() -> None:
+    """As on a fillet whose radius is off: a smooth surface explains the depths, and no second view."""
+    points = scan_box(1, points=4000, noise=0.005)
+    top = points[:, 2] > TOP - 4 * NOISE
+    points[top, 2] = TOP - 0.48 * TOLERANCE * (1 - np.cos(2 * np.pi * points[top, 0] / 4))
+    field = compare(points)
+    thinned = replace(field, aligned=replace(field.aligned, noise=0.005, spacing=1.14))
+    assert measure_sheets(thinned).share < OF_SCAN / 2

@@ -7,7 +7,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.geometry.local_fits import average_points
 from damageest.geometry.neighbourhoods import measure_local_areas, pick_at_most, pick_one_per_cube, thin_points
-from damageest.geometry.orientation import turn_toward_void
+from damageest.geometry.orientation import HINT, turn_toward_void
 from damageest.geometry.patches import Patches
 from damageest.stages.enclose._fill_gaps import fill_gaps
 
@@ -45,7 +45,10 @@ def build_surface(
     points, normals = average_points(points, counts, noise, chosen)
     chosen = np.arange(len(lost)) if len(lost) <= MOST_LOST else pick_at_most(lost, 1.3 * cell, MOST_LOST, 1.3)
     places = lost[chosen]
-    normals = turn_toward_void(points, normals, above, places, lost_normals[chosen], measure_local_areas(places), cell)
+    # A shallow point has lost the skin above it, though the gaps of the scan are too wide to show it bare: else the
+    # skin lost on the other side of a bore would decide.
+    hint = np.maximum(HINT, 1 / (1 + (depth / cell) ** 2))[:, None] * above
+    normals = turn_toward_void(points, normals, hint, places, lost_normals[chosen], measure_local_areas(places), cell)
     points, normals = fill_gaps(points, normals, depth, cell)
     return points, normals, measure_local_areas(points)
 

@@ -111,7 +111,7 @@ def _compute_face_normals(part: Part) -> Floats:
 def _reconstruct_body(points: Floats, above: Floats, cell: float, depth: int, scale: float) -> tuple[Floats, Ints]:
     """Vertices (V,3) and faces (F,3) of the Poisson surface of points (N,3). Normals are oriented outward by ``above``
     (N,3), the weighted normals of the nearest faces, and so that they agree with their neighbours."""
-    from damageest.geometry.orientation import turn_toward_void
+    from damageest.geometry.orientation import HINT, turn_toward_void
     from damageest_open3d._system import check
 
     check()
@@ -120,7 +120,7 @@ def _reconstruct_body(points: Floats, above: Floats, cell: float, depth: int, sc
     cloud: Any = o3d.geometry.PointCloud(o3d.utility.Vector3dVector(points))
     cloud.estimate_normals(o3d.geometry.KDTreeSearchParamKNN(NEIGHBOURS))
     nothing = np.empty((0, 3))
-    normals = turn_toward_void(points, np.asarray(cloud.normals), above, nothing, nothing, np.empty(0), cell)
+    normals = turn_toward_void(points, np.asarray(cloud.normals), HINT * above, nothing, nothing, np.empty(0), cell)
     cloud.normals = o3d.utility.Vector3dVector(normals)
     with o3d.utility.VerbosityContextManager(o3d.utility.VerbosityLevel.Error):
         try:

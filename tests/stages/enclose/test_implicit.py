@@ -13,6 +13,7 @@ from damageest.artefacts import Enclosures, Sites
 from damageest.geometry.distance import distance_to_mesh
 from damageest.geometry.solids import iou, to_manifold, to_solid, unite
 from damageest.pipeline.near_damage import sample_near_damage
+from damageest.stages.enclose._loss_surface import build_surface
 from damageest.stages.enclose.implicit import Implicit
 from damageest.stages.sample.edge_aware import EdgeAware
 from tests.scenes import TOLERANCE, Scene, scene
@@ -145,3 +146,16 @@ def test_skin_samples_reach_as_far_as_the_grid_does() -> None:
     (item,) = enclose_with(case, wide, nearby=nearby).items
     (piece,) = intersect_pieces(case, Enclosures((item,)))
     assert iou(piece, case.truth) > 0.97
+
+
+def test_shallow_points_apart_from_the_rest_open_to_the_skin_above_them() -> None:
+    """In a worn bore, few points at the rim of the wear exceed the tolerance. The scan is too sparse to show the
+    skin above them bare, and the skin lost on the other side of the bore must not turn them."""
+    angle, along = (grid.ravel() for grid in np.meshgrid(np.linspace(-0.1, 0.1, 15), np.linspace(-1, 1, 15)))
+    out = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
+    points = 10.2 * out + along[:, None] * np.array([0, 0, 1.0])
+    far, height = (grid.ravel() for grid in np.meshgrid(np.linspace(2, 4.3, 40), np.linspace(-9, 9, 30)))
+    other = np.stack([np.cos(far), np.sin(far), 0 * far], axis=1)
+    lost = 10 * other + height[:, None] * np.array([0, 0, 1.0])
+    _, normals, _ = build_surface(points, -out, np.full(len(points), 0.2), lost, -other, 0.005, 0.8 * 0.2)
+    assert (normals[:, 0] < -0.9).all()
