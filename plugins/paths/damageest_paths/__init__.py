@@ -7,7 +7,7 @@
 # assemble.py: the path, its figures and notes
 # drafts.py: passes and what they fill
 # form_choice.py: planes, or surfaces along the floor
-# beads.py, laid.py: the resulting beads
+# beads.py, stamping.py, laid.py: the resulting beads
 # foot.py: beads over air
 
 from __future__ import annotations

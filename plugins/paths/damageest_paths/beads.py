@@ -8,10 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from damageest.artefacts import BeadFill, Flags, Floats, Mesh
 from damageest.geometry.distance import distance_to_mesh
@@ -26,8 +24,6 @@ OVERHANGS = 3.0
 """Air below a bead, in heights of it, from which it hangs over beside the floor."""
 MOST_RAYS = 10_000
 """Pieces of beads below which the air is measured, or up to twice as many."""
-CHUNK = 2_000_000
-"""Places that are stamped at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,6 +167,9 @@ def _fill_solid(mesh: Mesh, low: Floats, size: tuple[int, int, int], edge: float
 
 def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, int], edge: float) -> Flags:
     """Whether the centre of each voxel lies in a bead."""
+    from damageest_paths.clearance.compiling import run_loops
+    from damageest_paths.stamping import mark_voxels
+
     done = np.zeros(size, bool)
     if not len(beads.start):
         return done
@@ -180,52 +179,9 @@ def stamp_beads(beads: Beads, frame: Frame, low: Floats, size: tuple[int, int, i
     counts = np.maximum(np.ceil(length / (beads.width / 2)).astype(int), 1)
     owner = np.repeat(np.arange(len(start)), counts)
     share = np.concatenate([(np.arange(count) + 0.5) / count for count in counts])
-    points = start[owner] + share[:, None] * (stop - start)[owner]
-    middle = points - (beads.height[owner] / 2)[:, None] * normal[owner]
     reach = np.hypot(beads.width.max() / 2, beads.height.max() / 2)
     half = reach + float((length / counts).max()) / 2 + np.sqrt(3) * edge
     span = int(np.ceil(half / edge))
-    ball = np.stack(np.meshgrid(*[np.arange(-span, span + 1)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
-    ball = ball[np.linalg.norm(ball, axis=1) * edge <= half]
-    for first in range(0, len(points), max(CHUNK // len(ball), 1)):
-        own = slice(first, first + max(CHUNK // len(ball), 1))
-        which = owner[own]
-        way = (stop - start)[which]
-        tops = _Tops(
-            points[own], middle[own], normal[which], way * (1 - share[own, None]), way * share[own, None],
-            beads.width[which], beads.height[which],
-        )  # fmt: skip
-        _stamp(done, tops, ball, low, edge)
+    sizes = np.stack([beads.width, beads.height], axis=1) / edge
+    run_loops(mark_voxels, done, (start - low) / edge, (stop - low) / edge, normal, sizes, owner, share, span)
     return done
-
-
-class _Tops(NamedTuple):
-    """Points (N,3) on the tops of beads: the ``middle`` (N,3) of the bead below each, its ``normal`` (N,3), how far its
-    line goes on ``ahead`` (N,3) and ``behind`` (N,3), its ``width`` (N,) and ``height`` (N,)."""
-
-    points: Floats
-    middle: Floats
-    normal: Floats
-    ahead: Floats
-    behind: Floats
-    width: Floats
-    height: Floats
-
-
-def _stamp(done: NDArray[np.bool_], tops: _Tops, ball: NDArray[np.int64], low: Floats, edge: float) -> None:
-    """Marks the voxels near the tops of beads that lie in the bead: as high as the layer, and not farther than half its
-    width from the line."""
-    normal, height = tops.normal, tops.height
-    cell = np.floor((tops.middle - low) / edge).astype(np.int64)[:, None] + ball
-    away = low + (cell + 0.5) * edge - tops.points[:, None]
-    front, back = np.linalg.norm(tops.ahead, axis=1), np.linalg.norm(tops.behind, axis=1)
-    line = (tops.ahead + tops.behind) / np.maximum(front + back, 1e-300)[:, None]
-    along = np.einsum("nmi,ni->nm", away, line)
-    beside = np.clip(along, -back[:, None], front[:, None])
-    up = np.einsum("nmi,ni->nm", away, normal) - beside * np.einsum("ni,ni->n", line, normal)[:, None]
-    across = np.einsum("nmi,nmi->nm", away, away) - up**2 - beside * (2 * along - beside)
-    tiny = 1e-9 * edge
-    inside = (up <= tiny) & (up >= -height[:, None] - tiny) & (across <= (tops.width[:, None] / 2) ** 2 + tiny)
-    inside &= ((cell >= 0) & (cell < np.array(done.shape))).all(axis=2)
-    x, y, z = cell[inside].T
-    done[x, y, z] = True

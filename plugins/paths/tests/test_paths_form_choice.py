@@ -86,7 +86,7 @@ def sunk(path: DepositPath) -> float:
 
 
 def test_where_many_beads_lie_in_metal_they_lie_less_deep() -> None:
-    usual, given = (plan(notch(3.0, 3.0), direction=UP, axes=5, **more) for more in ({}, {"penetration": 0.45}))
+    usual, given = (plan(notch(2.9, 2.9), direction=UP, axes=5, **more) for more in ({}, {"penetration": 0.45}))
     assert sunk(given) > MUCH_SUNK, "what the job says is done"
     assert sunk(usual) <= MUCH_SUNK
     assert (usual.unreached_volume - given.unreached_volume) / given.deposit_volume < MOST_LEFT
