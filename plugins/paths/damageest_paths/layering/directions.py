@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
@@ -147,24 +148,23 @@ def plan_parts(
 
     With 3 axes there is one plan. With more, the directions of later plans lie within the machine's tilt of the first.
     Layers along a floor get another plan where the first leaves more than `LITTLE`, and trials in planes reach some of
-    the rest.
+    the rest. A body of several pieces, of which one direction leaves some, gets a plan for each piece if that leaves
+    less: a direction that reaches a little of all leaves of each what no other reaches.
     """
     plans = [choose_direction(body, origin, directions, around, process, planner)]
     if process.axes == 3:
         return plans
-    within = [one for one in directions if one @ plans[0].frame.direction >= np.cos(process.tilt) - 1e-9]
     volume = float(body.volume())
     least = max((LITTLE if planner is plan_conformal else ENOUGH) * volume, process.bead.width**2 * process.height)
+    if _measure_worth(plans[-1], volume) > least:
+        pieces = _plan_pieces(body, origin, directions, around, process, planner)
+        plans = pieces if pieces and pieces[-1].missing_volume < MOST_LEFT * plans[-1].missing_volume else plans
+    within = _list_within(plans[0], directions, process)
     while len(plans) < MOST_PARTS:
         if _measure_worth(plans[-1], volume) <= least:
             break
-        left = plans[-1].missing
-        left_local = left.transform(np.hstack([plans[-1].frame.turn.T, np.zeros((3, 1))]))
-        standing = around.metal + (body - left_local)
-        beads = [
-            Mesh(mesh.vertices @ plan.frame.turn, mesh.faces) for plan in plans for mesh in _draw_plan(plan, process)
-        ]
-        there = replace(around, metal=standing, others=[*around.others, *beads])
+        left_local = gather_missing(plans)
+        there = _add_built(around, body - left_local, plans, process)
         if planner is plan_conformal:
             if not plans[-1].passes:
                 break
@@ -180,6 +180,45 @@ def plan_parts(
     return plans
 
 
+def _plan_pieces(
+    body: Any, origin: Floats, directions: Sequence[Floats], around: Surroundings, process: Process, planner: Planner
+) -> list[Plan]:
+    """A plan for each of the largest pieces of a body, the largest first, the last with what all of them leave; none
+    where it has one piece. Smaller ones belong to the first."""
+    from manifold3d import Manifold, OpType
+
+    least = LITTLE * float(body.volume())
+    pieces = sorted(body.decompose(), key=lambda piece: -float(piece.volume()))
+    large = [piece for piece in pieces[:MOST_PARTS] if piece.volume() > least]
+    if len(large) < 2:
+        return []
+    large[0] = Manifold.batch_boolean([large[0], *pieces[len(large) :]], OpType.Add)
+    plans: list[Plan] = []
+    built = Manifold()
+    for piece in large:
+        tried = _list_within(plans[0], directions, process) if plans else directions
+        plan = choose_direction(piece, origin, tried, _add_built(around, built, plans, process), process, planner)
+        missing, before = gather_missing([plan]), gather_missing(plans[-1:])
+        built += piece if missing is None else piece - missing
+        if before is not None:
+            own = plan.frame.move(before)
+            reasons = Counter(plan.reasons) + Counter(plans[-1].reasons)
+            plan = replace(plan, missing=own if plan.missing is None else plan.missing + own, reasons=dict(reasons))
+        plans.append(plan)
+    return plans
+
+
+def _list_within(first: Plan, directions: Sequence[Floats], process: Process) -> list[Floats]:
+    """The directions that the machine reaches where it holds the part for the first plan."""
+    return [one for one in directions if one @ first.frame.direction >= np.cos(process.tilt) - 1e-9]
+
+
+def _add_built(around: Surroundings, built: Any, plans: Sequence[Plan], process: Process) -> Surroundings:
+    """The surroundings with what is built, a Manifold, and the beads of plans."""
+    beads = [Mesh(mesh.vertices @ plan.frame.turn, mesh.faces) for plan in plans for mesh in _draw_plan(plan, process)]
+    return replace(around, metal=around.metal + built, others=[*around.others, *beads])
+
+
 def _draw_plan(plan: Plan, process: Process) -> list[Mesh]:
     """The beads of a plan, in its local coordinates."""
     return [draw_passes(plan.passes, process.bead.width, plan.height)] if plan.passes else []
@@ -187,7 +226,7 @@ def _draw_plan(plan: Plan, process: Process) -> list[Mesh]:
 
 def gather_missing(plans: Sequence[Plan]) -> Any:
     """What the last of the plans leaves, as a Manifold relative to the frame's origin; None where it leaves nothing."""
-    last = plans[-1]
-    if last.missing is None:
+    last = plans[-1] if plans else None
+    if last is None or last.missing is None:
         return None
     return last.missing.transform(np.hstack([last.frame.turn.T, np.zeros((3, 1))]))
