@@ -23,6 +23,9 @@ ROUNDS = 3
 """How often the planes are fitted again with the weights that the last normals give."""
 SCALES = (32, 80, 200)
 """Numbers of neighbours among which the width of a fit is chosen."""
+FEW, OF_ALL = 8, 5
+"""Neighbours of the planes that the fits start from, at least, and one in so many of all points: of few points, 32 lie
+on several faces."""
 KAPPA = 2.0
 """Standard deviations by which two fits of one point may differ because of noise."""
 BYTES_OF_NEIGHBOUR = 35
@@ -74,7 +77,7 @@ def average_points(points: Floats, counts: Ints, noise: float, chosen: Ints) -> 
         return np.empty((0, 3)), np.empty((0, 3))
     _require_memory(points, SCALES[0])
     tree = make_tree(points)
-    distance, index = query_neighbours(tree, points, min(SCALES[0], len(points)))
+    distance, index = query_neighbours(tree, points, min(SCALES[0], max(FEW, len(points) // OF_ALL), len(points)))
     normals, _ = _fit_planes(points, index, distance, noise)
     found = map_in_threads(
         lambda own: _choose_widest(tree, points, counts, noise, normals, chosen[own]), cut_evenly(len(chosen), CHUNK)

@@ -64,3 +64,14 @@ def test_points_are_fitted_in_pieces_of_any_size_alike(monkeypatch: pytest.Monke
     before = fit()
     monkeypatch.setattr(local_fits, "CHUNK", 37)
     assert fit() == before
+
+
+def test_few_points_on_the_walls_of_a_notch_face_across_them() -> None:
+    """Three walls of a plate 5 thick, their points 3 apart: the planes of few points are narrow."""
+    rng = np.random.default_rng(0)
+    along, height = rng.uniform(0, 1, 54), rng.uniform(-2.4, 2.4, 54)
+    wall = np.repeat([0, 1, 2], 18)
+    x, y = np.where(wall == 1, 0.0, 23 * along), np.select([wall == 0, wall == 2], [0.0, 32.0], 32 * along)
+    points = np.column_stack([x, y, height]) + 0.02 * rng.normal(size=(54, 3))
+    _, normals = average_points(points, np.ones(54, np.int64), 0.02, np.arange(54))
+    assert (np.abs(normals[:, 2]) < 0.5).mean() > 0.9

@@ -22,7 +22,12 @@ MIN_DAMAGE = 4
 """How many of these, itself included, must be damage. Where noise moves one point in 700 beyond the tolerance (a
 tolerance of four standard deviations and a pose error of one), one such point in two million has three others beside
 it."""
-
+FEWEST_DENSE, FAR = 4, 2.0
+"""Points within eps, itself included, that make a point dense in the sparsest scan. There the walls of a loss in a thin
+plate show too few: points that are in no site belong to one that they reach by steps of so many eps."""
+MOST_STRAY = 0.25
+"""Points in no site that do not reach one, as a share of those that do, up to which these belong to it. Where more lie
+anywhere, they are stray."""
 MAX_FOR_ALL = 200_000
 """Number of scan points above which the gaps between them are measured at few places only."""
 
@@ -63,11 +68,13 @@ class Dbscan(Cluster):
         eps, why = self._choose_eps(points, tolerance, bridging)
         # A sparse scan has fewer than k points on damage of four tolerances across; it must be found all the same.
         expected = self.neighbours * (1.5 * tolerance / typical) ** 2 if typical else np.inf
-        dense = int(np.clip(expected / 2, 4, self.neighbours))
+        dense = int(np.clip(expected / 2, FEWEST_DENSE, self.neighbours))
 
         cluster = run_dbscan(points, eps, dense)
         supported = _is_supported(aligned.points, damage, deviation.label == DAMAGE, bridging)
         cluster = self._drop_noise(points, cluster, supported, tolerance)
+        if dense == FEWEST_DENSE:
+            cluster = _reach_out(points, cluster, FAR * eps)
         found, first, inverse, count = np.unique(cluster, return_index=True, return_inverse=True, return_counts=True)
         order = [i for i in np.lexsort((first, -count)) if found[i] >= 0]
         number = np.zeros(len(found), np.int32)
@@ -149,6 +156,21 @@ def _measure_gaps(points: Floats, neighbours: int) -> tuple[float, float]:
 def _draw_evenly(count: int, wanted: int) -> Ints:
     """At most ``wanted`` of ``count`` indices, evenly spaced."""
     return np.linspace(0, count - 1, min(count, wanted)).round().astype(np.int64)
+
+
+def _reach_out(points: Floats, cluster: Ints, reach: float) -> Ints:
+    """``cluster`` (M,), and for points in none (-1) that of the nearest point (M,3) in one, over and over, up to
+    ``reach``; the same where many points reach none."""
+    out = cluster.copy()
+    while (out >= 0).any() and (out < 0).any():
+        left, found = np.flatnonzero(out < 0), np.flatnonzero(out >= 0)
+        distance, nearest = (column[:, 0] for column in find_neighbours(points[left], 1, points[found], reach))
+        reached = np.isfinite(distance)
+        if not reached.any():
+            break
+        out[left[reached]] = out[found[nearest[reached]]]
+    stray = int((out < 0).sum())
+    return out if stray <= MOST_STRAY * ((cluster < 0).sum() - stray) else cluster
 
 
 def _is_supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:

@@ -140,3 +140,30 @@ def test_the_bend_separates_clusters_from_noise(share: float, uneven: int) -> No
     eps = find_sharpest_bend(average)
     assert (average[: len(points)] <= eps).mean() > 0.95
     assert (average[len(points) :] <= eps).mean() < 0.1
+
+
+def notch(stray: int) -> tuple[Scan, Deviation]:
+    """The sparse scan of a plate 5 thick with a notch 50 x 40 through it, whose walls show a few points each, and
+    ``stray`` points inside the plate, anywhere."""
+    rng = np.random.default_rng(2)
+    size = np.array([400.0, 400.0])
+    top = np.column_stack([rng.uniform(0, size, (9000, 2)), np.zeros(9000)])
+    top = top[~((top[:, 0] < 40) & (np.abs(top[:, 1] - 200) < 25))]
+    back = np.column_stack([np.full(14, 40.0), np.linspace(176, 224, 14), rng.uniform(-4, -1, 14)])
+    side = np.column_stack([np.linspace(3, 33, 5), np.zeros(5), rng.uniform(-4, -1, 5)])
+    walls = np.concatenate([back, side + np.array([0, 175, 0]), side + np.array([0, 225, 0])])
+    lost = np.column_stack([rng.uniform(0, size, (stray, 2)), rng.uniform(-4, -1, stray)])
+    points = np.concatenate([top, walls, lost])
+    label = np.where(points[:, 2] < 0, DAMAGE, INTACT).astype(np.uint8)
+    return Scan(points, noise=0.05, spacing=4.2), Deviation(points[:, 2], np.zeros(len(points), np.int32), label)
+
+
+def test_walls_with_few_points_belong_to_the_notch_that_they_bound() -> None:
+    scan, deviation = notch(stray=0)
+    assert np.bincount(Dbscan().run(scan, deviation, 0.25).label[deviation.label == DAMAGE])[1:].tolist() == [24]
+
+
+def test_stray_points_near_a_notch_belong_to_no_site() -> None:
+    scan, deviation = notch(stray=40)
+    sites = Dbscan().run(scan, deviation, 0.25)
+    assert (sites.label[-40:] == 0).mean() > 0.8
