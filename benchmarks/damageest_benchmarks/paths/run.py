@@ -17,6 +17,7 @@ from damageest_benchmarks.paths.beam import count_flips, measure_shaded, measure
 from damageest_benchmarks.paths.check import count_crossings, measure_built, measure_nozzle
 from damageest_benchmarks.paths.practice import measure_practice
 from damageest_benchmarks.paths.scenes import Scene
+from damageest_benchmarks.paths.tilt import measure_beyond_need
 
 BEADS = 100.0
 """The volume of a deposit in cubes of the bead's width; it is less wide where the deposit is thin."""
@@ -32,7 +33,8 @@ class PathRow:
     and ``sunk`` (what of the beads lies in metal, by the independent check); of the reachable: ``filled``; of the way
     along passes: ``shaded`` (metal in the beam), ``travel``, and ``between`` (travel without the first way in and the
     last way out). ``why``: what of the deposit is out of reach, by reason. ``flips``: jumps of the rotary axis.
-    ``seconds``: of the processor, to plan; ``checked``: to check. The rest as in `Practice`."""
+    ``seconds``: of the processor, to plan; ``checked``: to check. ``beyond``, ``beyond_95``, ``beyond_mean``: as in
+    `Beyond`. The rest as in `Practice`."""
 
     kind: str
     name: str
@@ -68,6 +70,9 @@ class PathRow:
     air: float
     air_95: float
     floating: float
+    beyond: float
+    beyond_95: float
+    beyond_mean: float
 
 
 def choose_options(scene: Scene) -> dict[str, object]:
@@ -92,6 +97,7 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
     assert path is not None
     fill, width, height = path.fill, path.width, float(path.heights.min())
     is_some = bool(path.on.any())
+    beyond = measure_beyond_need(path, scene.left, stage)
     row = PathRow(
         kind=scene.kind,
         name=scene.name,
@@ -119,6 +125,9 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
         checked=0.0,
         why={item.why: item.volume / scene.body.volume for item in path.unreached},
         **asdict(measure_practice(path, scene.left)),
+        beyond=beyond.median,
+        beyond_95=beyond.most,
+        beyond_mean=beyond.mean,
     )
     return replace(row, checked=time.process_time() - planned)
 
@@ -179,6 +188,10 @@ DEMANDS = (
     Demand("nozzle clear of metal, bead widths", "gap", ".2f", least=1e-9),
     Demand("nozzle clear of earlier beads, bead widths", "built", ".2f", least=1e-9),
     Demand("no jump of the rotary axis", "flips", "d", most=0),
+    Demand("no reversal with the process on", "reversals", "d", most=0),
+    Demand("starts a layer at most 3", "starts_a_layer", ".1f", most=3.0),
+    Demand("floating at most 2 %", "floating", ".1%", most=0.02),
+    Demand("tilted no more than needed, in the median", "beyond", ".0f", most=0.0),
 )
 TRAVEL = 0.2
 """Median of travel over deposition that is asked for."""
@@ -211,7 +224,7 @@ def make_table(rows: Sequence[PathRow]) -> str:
     head = [
         "deposits", "axes", "number", "out of reach", "filled, least", "spill", "void", "gap", "from beads",
         "in the beam", "sunk", "flips", "travel, median", "largest", "starts a layer", "reversals", "corners", "tilted",
-        "axis jumps", "air, median", "air, 95 %", "floating", "time, median", "largest",
+        "beyond need, 95 %", "axis jumps", "air, median", "air, 95 %", "floating", "time, median", "largest",
     ]  # fmt: skip
     lines = [head]
     for kind in [*dict.fromkeys(row.kind for row in rows), "all"]:
@@ -244,6 +257,7 @@ def _make_line(kind: str, axes: int, own: Sequence[PathRow]) -> list[str]:
         str(sum(row.reversals for row in some)),
         str(sum(row.corners for row in some)),
         f"{np.median([row.tilted for row in some]):.0%}",
+        f"{max(row.beyond_95 for row in some):.0f}",
         str(sum(row.jumps for row in some)),
         f"{np.nanmedian([row.air for row in some]):.2f}",
         f"{np.nanmedian([row.air_95 for row in some]):.2f}",

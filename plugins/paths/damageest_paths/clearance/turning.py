@@ -10,7 +10,7 @@ from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.process.process import measure_along
 
-BLOCKED, CUT, TURN, TIGHT, TILT = 100.0, 30.0, 6.0, 0.2, 0.05
+BLOCKED, CUT, TURN, TIGHT, TILT = 100.0, 30.0, 6.0, 0.2, 0.2
 """Costs: of a pose that is not free; of a cut in the pass; of a turn by one radian; of a pose without room to spare; of
 a tilt of one radian at one pose."""
 FARTHEST = np.radians(50.0)
