@@ -20,6 +20,8 @@ from damageest.stages.part import CadFace, CadPmi, ReadPart
 if TYPE_CHECKING:
     from damageest_cadquery.reading.read import Model
 
+NAMED = 3
+"""Faces without triangles that are named."""
 LEAST_CHORD = 1e-7
 """Least chord in diagonals of the part: OpenCASCADE's own tolerance for a part of one metre is 1e-7."""
 
@@ -80,19 +82,29 @@ class Brep(ReadPart):
                 f"triangles deviate by up to {mesh.error * scale:.3g} {unit} from the CAD surface, more than the chord "
                 f"of {chord:.3g}; set a smaller part.angle (now {self.angle:g}; 2 takes longer)"
             )
-        return make_part(
-            mesh.vertices * scale,
-            mesh.faces,
-            unit,
-            path=str(self.path),
-            sha256=file_sha256(self.path),
-            faces_brep=mesh.faces_brep,
-            face_names=mesh.names,
-            face_kinds=mesh.kinds,
-            tessellation_error=error,
-            notes=tuple(notes),
-            cad_scale=scale,
-        )
+        try:
+            return make_part(
+                mesh.vertices * scale,
+                mesh.faces,
+                unit,
+                path=str(self.path),
+                sha256=file_sha256(self.path),
+                faces_brep=mesh.faces_brep,
+                face_names=mesh.names,
+                face_kinds=mesh.kinds,
+                tessellation_error=error,
+                notes=tuple(notes),
+                cad_scale=scale,
+            )
+        except InputError as fault:
+            if not mesh.left_out:
+                raise
+            count = len(mesh.left_out)
+            raise InputError(
+                f"{self.path}: {count} of its faces get no triangles with any of OpenCASCADE's settings "
+                f"({'; '.join(mesh.left_out[:NAMED])}); repair them in the CAD system, or set another part.chord (now "
+                f"{chord:.3g} {unit}). What is left {str(fault).removeprefix(f'{self.path}: ')}"
+            ) from None
 
     def cad_faces(self, unit: str) -> tuple[CadFace, ...]:
         """The faces of the CAD model, in the order in which `run` numbers them."""

@@ -174,3 +174,44 @@ def test_real_files_are_watertight(name: str, extents: tuple[float, ...]) -> Non
     assert part.faces_brep is not None
     assert part.tessellation_error < 5e-4 * part.diagonal  # a spline of the first is hard on the mesher; it is told
     assert part.tessellation_error < 7.5e-5 * part.diagonal or any("from the CAD surface" in n for n in part.notes)
+
+
+def make_cut_ball(claim: float) -> Any:
+    """A ball with a small flat, smaller than the tolerance that its edges claim: OpenCASCADE leaves it out, and makes
+    triangles half a millimetre off beside it."""
+    from OCP.ShapeFix import ShapeFix_ShapeTolerance
+
+    ball = cq.Workplane().sphere(10).cut(cq.Workplane().box(30, 30, 30).translate((0, 0, 24.9999))).val()
+    ShapeFix_ShapeTolerance().SetTolerance(ball.wrapped, claim)
+    return ball
+
+
+def test_a_face_that_is_left_out_is_triangulated_with_other_settings(tmp_path: Path) -> None:
+    ball = make_cut_ball(0.3)
+    part = Brep(path=write(ball, tmp_path / "ball.brep")).run("mm", 0.25)
+    assert part.volume == pytest.approx(ball.Volume(), rel=0.004)
+    assert part.face_kinds == ("sphere", "plane")
+    assert set(part.faces_brep) == {0, 1}
+
+
+def test_faces_without_triangles_are_named_where_the_part_stays_open(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from damageest_cadquery.reading import _mesh
+    from damageest_cadquery.reading.read import explore
+    from OCP.BRepTools import BRepTools
+    from OCP.TopAbs import TopAbs_FACE
+
+    mesh = _mesh._mesh
+
+    def leave_out(solid: Any, settings: Any) -> None:
+        mesh(solid, settings)
+        BRepTools.Clean_s(list(explore(solid, TopAbs_FACE))[4])
+
+    monkeypatch.setattr(_mesh, "_mesh", leave_out)
+    path = write(cq.Workplane().box(20, 20, 10).val(), tmp_path / "box.brep")
+    with pytest.raises(
+        InputError, match=r"box.brep: 1 of its faces get no triangles .*face 4, a plane near \(-10"
+    ) as told:
+        Brep(path=path).run("mm", 0.25)
+    assert str(told.value).count("box.brep") == 1

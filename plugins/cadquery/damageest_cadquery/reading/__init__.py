@@ -8,3 +8,4 @@
 # pmi.py: datums, datum systems and tolerances of a STEP AP242 file, with the CAD faces that they refer to
 # read.py: reading CAD files into OpenCASCADE solids, with their unit and the names of their faces
 # tessellate.py: triangulates OpenCASCADE solids without gaps
+# _mesh.py: calls its mesher, and again where it leaves faces without triangles

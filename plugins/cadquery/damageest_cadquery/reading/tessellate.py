@@ -11,18 +11,17 @@ from numpy.typing import NDArray
 
 from damageest.artefacts import Floats, Ints
 from damageest.errors import InputError
+from damageest_cadquery.reading._mesh import mesh_solid
 from damageest_cadquery.reading.read import explore, find_box
 
 _CHECKED = 2000
-_WITHIN = 1.06
-"""Deflection within faces, in chords, beside that on edges. With the same on both, a doubly curved face that is divided
-by the deflection of its edges is a few percent over it within, and OpenCASCADE divides all of its triangles by four."""
 
 
 @dataclass(frozen=True)
 class Tessellation:
     """``vertices`` (V,3), ``faces`` (F,3); ``faces_brep`` (F,), the number of each triangle's CAD face; those faces'
-    ``names`` and ``kinds``; ``error``, the largest distance found between triangles and CAD surface.
+    ``names`` and ``kinds``; ``error``, the largest distance found between triangles and CAD surface; the faces
+    ``left_out`` that have no triangles, as words.
     """
 
     vertices: Floats
@@ -31,6 +30,7 @@ class Tessellation:
     names: tuple[str, ...]
     kinds: tuple[str, ...]
     error: float
+    left_out: tuple[str, ...] = ()
 
 
 def measure_diagonal(solids: list[Any]) -> float:
@@ -52,22 +52,9 @@ def tessellate(solids: list[Any], chord: float, angle: float, name_of: Callable[
 
 
 def _tessellate_once(solids: list[Any], chord: float, angle: float, name_of: Callable[[Any], str]) -> Tessellation:
-    from OCP.BRepMesh import BRepMesh_IncrementalMesh
-    from OCP.BRepTools import BRepTools
-    from OCP.IMeshTools import IMeshTools_Parameters
-
-    parameters = IMeshTools_Parameters()
-    parameters.Deflection, parameters.DeflectionInterior = chord, _WITHIN * chord
-    parameters.MinSize = chord / 10
-    parameters.Angle = float(np.radians(angle))
-    parameters.Relative = parameters.InParallel = False
-    # without it the inside of a trimmed sphere can deviate by ten times the chord
-    parameters.EnableControlSurfaceDeflectionAllSurfaces = True
     builder = _Builder(chord, name_of)
     for solid in solids:
-        BRepTools.Clean_s(solid)  # the file may contain a coarser triangulation
-        BRepMesh_IncrementalMesh(solid, parameters)
-        builder.add(solid)
+        builder.add(mesh_solid(solid, chord, float(np.radians(angle))), solid)
     return builder.joined()
 
 
@@ -89,9 +76,11 @@ class _Builder:
         self.kinds: list[str] = []
         self.same: list[tuple[Ints, Ints]] = []
         self.count = 0
+        self.left_out: list[str] = []
         self.error = 0.0
 
-    def add(self, solid: Any) -> None:
+    def add(self, solid: Any, original: Any) -> None:
+        """``solid`` with triangles, and the ``original``, whose faces carry the names and have the same order."""
         from OCP.TopAbs import TopAbs_EDGE, TopAbs_FACE, TopAbs_VERTEX
         from OCP.TopExp import TopExp
         from OCP.TopoDS import TopoDS
@@ -102,9 +91,9 @@ class _Builder:
         TopExp.MapShapes_s(solid, TopAbs_VERTEX, corners)
         on_edge: dict[int, Ints] = {}
         at_corner: dict[int, int] = {}
-        for shape in explore(solid, TopAbs_FACE):
+        for shape, named in zip(explore(solid, TopAbs_FACE), explore(original, TopAbs_FACE), strict=True):
             face = TopoDS.Face_s(shape)
-            found = self._face(face)
+            found = self._face(face, self.name_of(TopoDS.Face_s(named)))
             if found is None:
                 continue
             triangulation, location, start = found
@@ -126,7 +115,7 @@ class _Builder:
                         known = at_corner.setdefault(corners.FindIndex(vertex), node)
                         self.same.append((np.array([known]), np.array([node])))
 
-    def _face(self, face: Any) -> tuple[Any, Any, int] | None:
+    def _face(self, face: Any, name: str) -> tuple[Any, Any, int] | None:
         from OCP.BRep import BRep_Tool
         from OCP.BRepAdaptor import BRepAdaptor_Surface
         from OCP.TopAbs import TopAbs_REVERSED
@@ -136,10 +125,12 @@ class _Builder:
         triangulation = BRep_Tool.Triangulation_s(face, location)
         adaptor = BRepAdaptor_Surface(face)
         number = len(self.names)
-        self.names.append(self.name_of(face))
+        self.names.append(name)
         self.kinds.append(name_kind(adaptor))
         if triangulation is None:
-            return None  # a face narrower than the mesher's resolution: its edges coincide
+            # often a face narrower than the mesher's resolution, whose edges coincide
+            self.left_out.append(_describe(face, number, name, self.kinds[-1]))
+            return None
         move = location.Transformation()
         nodes = range(1, triangulation.NbNodes() + 1)
         points = np.array([triangulation.Node(i).Transformed(move).Coord() for i in nodes])
@@ -181,7 +172,14 @@ class _Builder:
             tuple(self.names) if any(self.names) else (),
             tuple(self.kinds),
             self.error,
+            tuple(self.left_out),
         )
+
+
+def _describe(face: Any, number: int, name: str, kind: str) -> str:
+    """A face in words: its number, name and kind, and where it is."""
+    x, y, z = find_box([face]).CornerMin().Coord()
+    return f"face {number}{f' ({name})' if name else ''}, a {kind} near ({x:.4g}, {y:.4g}, {z:.4g})"
 
 
 def _find_edge_nodes(edge: Any, triangulation: Any, location: Any) -> Ints | None:
