@@ -43,6 +43,12 @@ def read_polygons(path: Path, suffix: str, triangles: bool = False) -> tuple[Flo
     return vertices, made.faces, note or ""
 
 
+def read_corners(path: Path) -> Ints:
+    """The corners (C,) of all faces of an OBJ or OFF file. Raises FormatError or InputError where some are cut off."""
+    found = {".obj": _read_obj, ".off": _read_off}[path.suffix.lower()](path)
+    return np.empty(0, np.int64) if found is None else found[1]
+
+
 def _read_obj(path: Path) -> Polygons | None:
     from damageest.io.points.mesh import read_obj_vertices
 
@@ -75,20 +81,21 @@ def _read_off(path: Path) -> Polygons | None:
 
 
 def _read_ply(path: Path) -> Polygons | None:
-    from damageest.io.points.ply import read
+    from damageest.io.points.loose import CORNERS
+    from damageest.io.points.ply import read_vertices
     from damageest.io.points.ply_header import read_header
     from damageest.io.points.ply_lists import read_lists
 
     header = read_header(path)
     for element in header.elements:
         names = [one.name for one in element.lists]
-        name = next((one for one in names if one in ("vertex_indices", "vertex_index")), None)
+        name = next((one for one in names if one in CORNERS), None)
         if element.name in ("face", "tristrips") and name is not None:
             corners, count = read_lists(path, header, element, name)
             if element.name == "tristrips":
                 corners = _divide_strips(corners, count)
                 count = np.full(len(corners) // 3, 3)
-            return read(path).points, corners, count
+            return read_vertices(path, header).points, corners, count
     return None
 
 

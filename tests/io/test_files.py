@@ -33,7 +33,7 @@ def read_with(request: pytest.FixtureRequest, path: Path, monkeypatch: pytest.Mo
             raise error
 
         monkeypatch.setattr(trimesh, "load_scene", fail)
-        monkeypatch.setattr(ply, "read", fail)
+        monkeypatch.setattr(ply, "read_vertices", fail)
         request.param(path)
 
     return read

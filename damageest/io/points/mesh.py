@@ -1,6 +1,7 @@
 """Scans stored as meshes: the vertices of STL, OBJ, OFF and 3MF files.
 
-Triangles are not used, so holes, edges of three triangles and wrong turns do not matter.
+Of its faces only their corners are used: a vertex of none is no point. So holes, edges of three triangles and wrong
+turns do not matter.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from damageest.artefacts import Floats
 from damageest.geometry.duplicates import find_duplicates
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_unit, scale_colours
+from damageest.io.points.loose import drop_loose, list_corners
 from damageest.io.points.text import parse_numbers
 from damageest.io.triangles import read_stl_corners, read_triangles
 
@@ -22,9 +24,11 @@ NOTE = "the file is a mesh; its vertices are used as the scan's points"
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """The vertices of the mesh. Its triangles are not used."""
+    """The vertices of the mesh's faces."""
     readers = {".stl": _read_stl, ".obj": _read_obj, ".off": _read_off, ".3mf": _read_3mf}
-    return replace(readers[path.suffix.lower()](path), notes=(NOTE,))
+    suffix = path.suffix.lower()
+    file = replace(readers[suffix](path), notes=(NOTE,))
+    return drop_loose(file, list_corners(path)) if suffix in (".obj", ".off") else file
 
 
 def _read_stl(path: Path) -> PointFile:

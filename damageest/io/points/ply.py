@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_colours, find_confidence, find_unit, scale_colours
+from damageest.io.points.loose import drop_loose, list_ply_corners
 from damageest.io.points.ply_header import Element, Header, read_header
 from damageest.io.points.ply_lists import skip_rows
 from damageest.io.points.text import parse_numbers
@@ -31,8 +32,14 @@ Columns = Mapping[str, Any] | NDArray[np.void]
 
 
 def read(path: Path, columns: str | None = None) -> PointFile:
-    """Points and, where the vertices have them, normals, colours and confidence."""
+    """Points and, where the vertices have them, normals, colours and confidence. Vertices of a mesh that belong to no
+    face are left out."""
     header = read_header(path)
+    return drop_loose(read_vertices(path, header), list_ply_corners(path, header))
+
+
+def read_vertices(path: Path, header: Header) -> PointFile:
+    """All vertices, with what they have."""
     count, at = header.vertex.count, 0
     whole: dict[str, Any] = {}
     for block in read_blocks(path, header):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import mmap
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -22,7 +24,25 @@ def read_lists(path: Path, header: Header, element: Element, name: str) -> tuple
 
     Raises FormatError where the file ends before.
     """
-    data, at, order = path.read_bytes(), header.end, header.order
+    items, counts = list[NDArray[Any]](), list[NDArray[Any]]()
+    for rows in _walk_file(path, header, element):
+        items.append(rows[f"{name} items"].ravel())
+        counts.append(rows[f"{name} count"])
+    empty = np.empty(0)
+    return np.concatenate([empty, *items]).astype(np.int64), np.concatenate([empty, *counts]).astype(np.int64)
+
+
+def walk_lists(path: Path, header: Header, element: Element, name: str) -> Iterator[Ints]:
+    """The items (C,) of one list of an element, in pieces. Raises FormatError where the file ends before."""
+    for rows in _walk_file(path, header, element):
+        yield rows[f"{name} items"].ravel().astype(np.int64)
+
+
+def _walk_file(path: Path, header: Header, element: Element) -> list[NDArray[np.void]]:
+    """The rows of an element in runs of equal length."""
+    with path.open("rb") as stream:
+        data: Any = mmap.mmap(stream.fileno(), 0, access=mmap.ACCESS_READ)
+    at, order = header.end, header.order
     text = header.form == "ascii"
     if text:
         data, at, order = parse_numbers(data[header.end :]).tobytes(), 0, "="
@@ -30,12 +50,7 @@ def read_lists(path: Path, header: Header, element: Element, name: str) -> tuple
         if one is element:
             break
         at = skip_rows(data, at, one, order, text)
-    items, counts = list[NDArray[Any]](), list[NDArray[Any]]()
-    for rows in _walk(data, at, element, order, text)[0]:
-        items.append(rows[f"{name} items"].ravel())
-        counts.append(rows[f"{name} count"])
-    empty = np.empty(0)
-    return np.concatenate([empty, *items]).astype(np.int64), np.concatenate([empty, *counts]).astype(np.int64)
+    return _walk(data, at, element, order, text)[0]
 
 
 def skip_rows(data: Any, at: int, element: Element, order: str, text: bool = False) -> int:
