@@ -10,11 +10,10 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.errors import InputError
 from damageest.geometry.polygons import triangulate_polygons
+from damageest.io.points.corners import CORNERS, join_obj_lines, read_obj_corners, read_off_corners
 
-_OBJ_FACE = re.compile(rb"^[ \t]*fo?[ \t]+([^\n#]*)", re.MULTILINE)
 _OWN_OBJ = re.compile(rb"^[ \t]*fo?(?:(?:[ \t]+[^\s#]+){4}|(?:[ \t]+[^\s#]+){0,2}[ \t]+(?:-|0[\s/]))", re.MULTILINE)
 """A face of four corners, or by numbers that count backward or from 0, which trimesh takes from the end of the file."""
-_OBJ_VERTEX = re.compile(rb"^[ \t]*v[ \t]", re.MULTILINE)
 
 Polygons = tuple[Floats, Ints, Ints]
 """Vertices (V,3), the corners (C,) of all faces one after the other, and how many (F,) each face has."""
@@ -43,45 +42,20 @@ def read_polygons(path: Path, suffix: str, triangles: bool = False) -> tuple[Flo
     return vertices, made.faces, note or ""
 
 
-def read_corners(path: Path) -> Ints:
-    """The corners (C,) of all faces of an OBJ or OFF file. Raises FormatError or InputError where some are cut off."""
-    found = {".obj": _read_obj, ".off": _read_off}[path.suffix.lower()](path)
-    return np.empty(0, np.int64) if found is None else found[1]
-
-
-def _read_obj(path: Path) -> Polygons | None:
+def _read_obj(path: Path) -> Polygons:
     from damageest.io.points.mesh import read_obj_vertices
 
-    data = path.read_bytes().replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\\\n", b" ")
-    rows = _OBJ_FACE.findall(data)
-    count = np.array([len(row.split()) for row in rows], np.int64)
-    corners = np.array(re.sub(rb"/\S*", b"", b" ".join(rows)).split(), "S").astype(np.int64)
-    if not corners.all():
-        raise InputError(f"{path}: a face has the vertex 0, but OBJ counts from 1; export the file again")
-    relative = corners < 0
-    if relative.any():  # they count from the last vertex in front of the face
-        faces = np.array([match.start() for match in _OBJ_FACE.finditer(data)])
-        known = np.searchsorted([match.start() for match in _OBJ_VERTEX.finditer(data)], faces)
-        corners = np.where(relative, corners + np.repeat(known, count), corners - 1)
-    else:
-        corners = corners - 1
-    return read_obj_vertices(data)[:, :3], corners, count
+    data = join_obj_lines(path.read_bytes())
+    return read_obj_vertices(data)[:, :3], *read_obj_corners(path, data)
 
 
-def _read_off(path: Path) -> Polygons | None:
-    from damageest.io.points.mesh import read_off_rows
+def _read_off(path: Path) -> Polygons:
+    from damageest.io.points.off import read_off_rows
 
-    vertices, faces, expected, _ = read_off_rows(path)
-    rows = [row.split() for row in faces[:expected]]
-    count = np.array([int(row[0]) for row in rows], np.int64)
-    if len(rows) < expected or any(len(row) <= int(row[0]) for row in rows):
-        raise InputError(f"{path}: the OFF file is truncated: it has {len(rows)} of {expected} whole faces")
-    corners = np.array([word for row in rows for word in row[1 : int(row[0]) + 1]], "S").astype(np.int64)
-    return vertices[:, :3], corners, count
+    return read_off_rows(path)[0][:, :3], *read_off_corners(path)
 
 
 def _read_ply(path: Path) -> Polygons | None:
-    from damageest.io.points.loose import CORNERS
     from damageest.io.points.ply import read_vertices
     from damageest.io.points.ply_header import read_header
     from damageest.io.points.ply_lists import read_lists

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from damageest.artefacts import Ints
 from damageest.errors import InputError
 from damageest.io.points import PointFile
-from damageest.io.points.ply_header import Header
-from damageest.io.points.ply_lists import walk_lists
 
 MOST = 0.75
 """Share of loose vertices up to which they are no part of the scan. Where more are loose, the file holds points, and
 some faces beside them."""
-CORNERS = ("vertex_indices", "vertex_index")
-"""Names of the list of a face's vertices in a PLY file."""
 
 
 def drop_loose(file: PointFile, corners: Iterable[Ints]) -> PointFile:
@@ -36,18 +31,3 @@ def drop_loose(file: PointFile, corners: Iterable[Ints]) -> PointFile:
         return file
     note = f"{loose:,} of {count:,} vertices belong to no face of the mesh: they are left out"
     return replace(file.take(is_used), notes=(*file.notes, note))
-
-
-def list_ply_corners(path: Path, header: Header) -> Iterable[Ints]:
-    """The corners of the faces of a PLY file in pieces; none where it has no faces."""
-    for element in header.elements:
-        name = next((one.name for one in element.lists if one.name in CORNERS), None)
-        if element.name in ("face", "tristrips") and name is not None and element.count:
-            yield from walk_lists(path, header, element, name)
-
-
-def list_corners(path: Path) -> Iterable[Ints]:
-    """The corners of the faces of an OBJ or OFF file; none where it has no faces."""
-    from damageest.io.polygons import read_corners
-
-    yield read_corners(path)

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_colours, find_confidence, find_unit, scale_colours
-from damageest.io.points.loose import drop_loose, list_ply_corners
+from damageest.io.points.corners import list_ply_corners
+from damageest.io.points.loose import drop_loose
 from damageest.io.points.ply_header import Element, Header, read_header
 from damageest.io.points.ply_lists import skip_rows
 from damageest.io.points.text import parse_numbers
