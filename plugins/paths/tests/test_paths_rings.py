@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from damageest_paths.fill.fill import list_lines
 from damageest_paths.fill.joints import find_reversals
+from damageest_paths.fill.merging import merge_rings
 from damageest_paths.fill.regions import cover, make_region, measure_length
-from damageest_paths.fill.rings import soften
+from damageest_paths.fill.rings import list_levels, soften
 from damageest_paths.fill.stripes import Bead
 from manifold3d import CrossSection, OpType
 
@@ -78,3 +79,24 @@ def test_a_bead_is_covered_as_its_discs_are(step: float) -> None:
     thick = 0.012
     assert (drawn - true.offset(thick)).area() < 1e-3
     assert (true - drawn.offset(thick)).area() < 1e-3
+
+
+@pytest.mark.slow
+def test_rings_round_holes_become_one() -> None:
+    """Of a plate with two holes and an arm, in which no spiral goes from ring to ring."""
+    plate = CrossSection.square((60, 24)) + CrossSection.square((8, 14)).translate((52, 20))
+    region = plate - CrossSection.circle(4, 48).translate((14, 12)) - CrossSection.circle(5, 48).translate((44, 11))
+    rings, _ = list_levels(soften(region.offset(-1.0), None, BEAD.width), BEAD)
+    merged = merge_rings(rings, BEAD.step)
+    assert len(rings) > 6
+    assert len(merged) <= 2
+    assert not find_reversals(np.concatenate([merged[0], merged[0][:3]]), BEAD.width)
+    lines = list_lines(region, "zigzag", BEAD, 0.0)
+    assert sum(measure_length(line.points) > 2 * BEAD.width for line in lines) <= 3
+    assert (region - cover([line.points for line in lines], BEAD.width)).area() < 0.015 * region.area()
+
+
+def test_rings_far_from_each_other_stay_apart() -> None:
+    rings = [np.array([[0.0, 0], [9, 0], [9, 9], [0, 9]]) + np.array([apart, 0.0]) for apart in (0.0, 12.0)]
+    assert len(merge_rings(rings, BEAD.step)) == 2
+    assert len(merge_rings([rings[0], rings[0] + np.array([9 + 1.2 * BEAD.step, 0.0])], BEAD.step)) == 1

@@ -3,6 +3,7 @@
 # fill.py: patterns that fill a layer
 # joints.py: joins lines whose ends are near into one pass, where that makes no reversal
 # lines.py: the middle line of a pass, and what it is
+# merging.py: merges rings that lie beside each other into one
 # middles.py: lines in the middle of what is narrower than a bead
 # regions.py: regions of a plane as manifold3d's CrossSection, which has the polygons and offsets of Clipper2
 # rings.py: rings within a region, and the spiral that they become

@@ -8,7 +8,8 @@ import numpy as np
 
 from damageest.artefacts import Floats
 from damageest_paths.fill.joints import SHY, WINDOW, find_reversals, open_ring
-from damageest_paths.fill.lines import Line
+from damageest_paths.fill.lines import Kind, Line
+from damageest_paths.fill.merging import merge_rings
 from damageest_paths.fill.middles import draw_middle
 from damageest_paths.fill.regions import (
     close_ring,
@@ -26,6 +27,8 @@ SOFT = 0.14
 """Radius in bead widths of the corners of a ring, within which the border of a region is smoothed too."""
 INSIDE = 0.004
 """Bead widths that a ring keeps from where no bead may lie."""
+SPARE = 1.3
+"""How much farther apart than in a reversal the turns of a tip may be that is left out: its ring is made simpler."""
 SPIKE = 0.01
 """Area, in squares of the bead's width, from which a ring goes round something narrow in an arc."""
 NEXT = 1.0
@@ -56,8 +59,8 @@ def _find_spikes(free: Any, width: float) -> Any:
 def _blunt(sharp: Any, blunt: Any, width: float) -> Any:
     """A region without its tips beyond a ``blunt`` one, where a ring round it would come back on itself."""
     rings = [np.asarray(ring, dtype=np.float64) for ring in sharp.to_polygons()]
-    rings = [np.concatenate([ring, ring[:2]]) for ring in rings]
-    ends = [ring[number] for ring in rings for number in find_reversals(ring, width)]
+    rings = [np.concatenate([ring, ring[:3]]) for ring in rings]
+    ends = [ring[number] for ring in rings for number in find_reversals(ring, SPARE * width)]
     if not ends:
         return sharp
     near = cover([end[None] for end in ends], 2 * WINDOW * width)
@@ -72,7 +75,8 @@ def list_levels(inner: Any, bead: Bead) -> tuple[list[Floats], list[Line]]:
     while not inner.is_empty():
         bare, shrunk = shift_border(inner, -width / 2), shift_border(inner, -step)
         # each of the shifts triples the corners of a smooth border
-        inner = drop_narrow(shrunk, SOFT / 2 * width, keeps_corners=True).simplify(INSIDE / 2 * width)
+        inner = drop_narrow(shrunk, SOFT / 2 * width, keeps_corners=True)
+        inner = _blunt(inner, drop_narrow(inner, SOFT * width), width).simplify(INSIDE / 2 * width)
         for piece in list_pieces(bare):
             own = piece ^ inner
             if not shift_border(own, -slim).is_empty():
@@ -117,6 +121,14 @@ def draw_spiral(inner: Any, bead: Bead, ahead: Floats) -> list[Line]:
         last = open_ring(ring, SHY * bead.width if middles else bead.step) if parts else close_ring(ring)
         lines.append(Line(np.concatenate([*parts, last]), "spiral" if parts else "ring"))
     return [*lines, *middles]
+
+
+def draw_one(inner: Any, bead: Bead, ahead: Floats) -> list[Line]:
+    """Rings, merged into as few as may be, and the lines in the middle. They start in the direction ``ahead`` (2,)."""
+    rings, middles = list_levels(inner, bead)
+    merged = merge_rings(rings, bead.step)
+    kind: Kind = "ring" if len(merged) == len(rings) else "spiral"
+    return [*[Line(close_ring(_start_ahead(ring, ahead)), kind) for ring in merged], *middles]
 
 
 def _start_ahead(ring: Floats, ahead: Floats) -> Floats:

@@ -19,7 +19,7 @@ from damageest_paths.fill.regions import (
     shift_border,
     turn_points,
 )
-from damageest_paths.fill.rings import INSIDE, draw_spiral, list_levels, read_rings, soften, start_farthest
+from damageest_paths.fill.rings import INSIDE, draw_one, draw_spiral, list_levels, read_rings, soften, start_farthest
 from damageest_paths.fill.stripes import Bead, fill_with_rows
 
 LONG = 1.6
@@ -30,6 +30,8 @@ THIN = 0.08
 """Area, in squares of the bead's width, of what a ring does not cover of a thin piece, from which it gets a line."""
 WAY, MISSED = 8.0, 6.0
 """Bead widths of way that a pass more costs, and a square of the bead's width that stays without a bead."""
+SCRAP = 1.5
+"""Bead widths from which a line counts where it is looked whether fewer would do."""
 CRUMB = 0.02
 """Area, in squares of the bead's width, up to which a gap does not count where patterns are compared."""
 
@@ -88,7 +90,18 @@ def weave_piece(region: Any, pattern: Pattern, bead: Bead, angle: float, style: 
     if free is None and inner.is_empty():
         link = None
     found = [part_lines(join_all(lines, link, bead), bead) for lines in tries]
-    return min(found, key=lambda lines: _estimate(lines, region, bead))
+    best = min(found, key=lambda lines: _estimate(lines, region, bead))
+    is_free = pattern == "spiral" or (pattern == "zigzag" and style.is_along)
+    if inner.is_empty() or not is_free or _count_long(best, width) == 1:
+        return best
+    merged = part_lines(join_all([*thin, *draw_one(inner, bead, ahead)], link, bead), bead)
+    if _count_long(merged, width) >= _count_long(best, width):
+        return best
+    return min(best, merged, key=lambda lines: _estimate(lines, region, bead))
+
+
+def _count_long(lines: Sequence[Line], width: float) -> int:
+    return sum(measure_length(line.points) > SCRAP * width for line in lines)
 
 
 def part_lines(lines: Sequence[Line], bead: Bead) -> list[Line]:
