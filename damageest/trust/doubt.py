@@ -82,9 +82,11 @@ class SiteFacts:
     of its depth that a motion explains which puts no other skin outside. ``other_poses``: share of its skin that is not
     skin in another pose that fits as well. ``free``: motions that the scan leaves free. ``displaced``: numbers of the
     surplus as large as the loss, ``twins`` of that of the same shape elsewhere. ``bent_wall``: thickness of a wall that
-    may be dented there, else 0. ``covered``: numbers and areas of the surplus on its skin. ``beyond``: volume that no
-    scan point shows, and ``beyond_words``: how it was found, ``beyond_at``: where. ``shut`` and ``turned``: shares of
-    its inner surface that could be seen from nowhere, and only from where the skin beside it was not seen.
+    may be dented there, else 0. ``edges``: share of all sharp edges along which it runs; ``rounded``: the typical depth
+    of the sites that run along nearly all. ``covered``: numbers and areas of the surplus on its skin. ``beyond``:
+    volume that no scan point shows, and ``beyond_words``: how it was found, ``beyond_at``: where. ``shut`` and
+    ``turned``: shares of its inner surface that could be seen from nowhere, and only from where the skin beside it was
+    not seen.
     ``other_volume``: by the other method; None where that was not asked, NaN where it gave none. ``terms``: of the
     interval, those of plugins among them. ``measured``: what rules of plugins measured, by their names; ``failed``: why
     a rule could not measure, by its code.
@@ -112,6 +114,8 @@ class SiteFacts:
     displaced: tuple[int, ...] = ()
     twins: tuple[int, ...] = ()
     bent_wall: float = 0.0
+    edges: float = 0.0
+    rounded: float = 0.0
     covered: tuple[tuple[int, float], ...] = ()
     beyond: float = 0.0
     beyond_words: str = ""
