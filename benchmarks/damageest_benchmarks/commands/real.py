@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import typer
 from damageest_evaluate.commands.counted import show_table
 
-from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
@@ -20,6 +20,7 @@ def command(
     workers: Workers = 1,
     timeout: Timeout = 900,
     out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Run real parts and compare them with a crude difference.
@@ -32,9 +33,10 @@ def command(
     from damageest_evaluate.tables import format_markdown
 
     from damageest.registry import Registry
-    from damageest_benchmarks.commands._counted import split_words
+    from damageest_benchmarks.commands._counted import prepare_places, split_words, write_measured
     from damageest_benchmarks.real.case import DRAWS, PARTS, TOLERANCES, RealCase, list_sources, make_real_table
 
+    prepare_places(out, write, "real")
     source = fingerprint_code(Registry.discover())
     present = [part for part in PARTS if (folder / part.name / part.scan).is_file()]
     cases = [
@@ -51,3 +53,4 @@ def command(
     rows = run_counted(cases, out, "real.jsonl", workers, timeout, describe)
     text = f"{format_markdown(make_real_table(rows))}\n\n{format_markdown(list_sources())}"
     show_table(text, rows, as_json)
+    write_measured(text, "real", write)

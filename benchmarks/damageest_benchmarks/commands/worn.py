@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import typer
 from damageest_evaluate.commands.counted import show_table
 
-from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers
+from damageest_benchmarks.commands._counted import AsJson, RowsFolder, Timeout, Workers, Write
 
 
 def command(
@@ -15,6 +15,7 @@ def command(
     workers: Workers = 1,
     timeout: Timeout = 600,
     out: RowsFolder = None,
+    write: Write = None,
     as_json: AsJson = False,
 ) -> None:
     """Count right results on 60 worn parts. Bushes, dies, rails, cams, seats and punches.
@@ -27,6 +28,7 @@ def command(
     from damageest_evaluate.tables import format_markdown
 
     from damageest.registry import Registry
+    from damageest_benchmarks.commands._counted import prepare_places, write_measured
     from damageest_benchmarks.real.worn import make_worn_cases, make_worn_table
 
     def describe(row: dict[str, Any]) -> str:
@@ -34,6 +36,9 @@ def command(
         told = row["error"] or f"{row['volume']:.1f} ({row['low']:.0f} to {row['high']:.0f}), {row['verdict']}"
         return f"{row['kind']} {row['seed']}: {told}; worn {true[0]:.1f} to {true[1]:.1f}, {row['seconds']:.0f} s"
 
+    prepare_places(out, write, "worn")
     cases = make_worn_cases(every, fingerprint_code(Registry.discover()))
     rows = run_counted(cases, out, "worn.jsonl", workers, timeout, describe)
-    show_table(format_markdown(make_worn_table(rows)), rows, as_json)
+    table = format_markdown(make_worn_table(rows))
+    show_table(table, rows, as_json)
+    write_measured(table, "worn", write)
