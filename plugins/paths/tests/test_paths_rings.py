@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 from damageest_paths.fill.fill import list_lines
 from damageest_paths.fill.joints import find_reversals
+from damageest_paths.fill.lines import Line
 from damageest_paths.fill.merging import merge_rings
 from damageest_paths.fill.regions import cover, make_region, measure_length
 from damageest_paths.fill.rings import list_levels, soften
 from damageest_paths.fill.stripes import Bead
+from damageest_paths.fill.weave import join_all
 from manifold3d import CrossSection, OpType
 
 from damageest.artefacts import Floats
@@ -100,3 +102,10 @@ def test_rings_far_from_each_other_stay_apart() -> None:
     rings = [np.array([[0.0, 0], [9, 0], [9, 9], [0, 9]]) + np.array([apart, 0.0]) for apart in (0.0, 12.0)]
     assert len(merge_rings(rings, BEAD.step)) == 2
     assert len(merge_rings([rings[0], rings[0] + np.array([9 + 1.2 * BEAD.step, 0.0])], BEAD.step)) == 1
+
+
+def test_a_ring_that_shrinks_to_a_place_is_left_out() -> None:
+    """It has no direction in which it could be joined with the line beside it."""
+    row = Line(np.array([[0.0, 0.0], [5.0, 0.0]]), "row")
+    place = Line(np.full((5, 2), 5.5) * [1.0, 0.0], "ring")
+    assert [len(line.points) for line in join_all([row, place], None, BEAD)] == [2]
