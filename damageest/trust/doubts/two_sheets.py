@@ -7,7 +7,15 @@ from typing import Any
 
 from damageest.artefacts import Reason
 from damageest.trust.doubt import Rule, ScanFacts, SiteCase, SiteFacts
-from damageest.trust.views.two_sheets import AGAINST, EXPLAINED, OF_SCAN, Sheets, measure_two_sheets
+from damageest.trust.views.two_sheets import (
+    AGAINST,
+    EXPLAINED,
+    EXPLAINED_BY_MANY,
+    MANY,
+    OF_SCAN,
+    Sheets,
+    measure_two_sheets,
+)
 
 
 class TwoSheets(Rule):
@@ -15,7 +23,7 @@ class TwoSheets(Rule):
     meaning = "the scan shows two surfaces over the same skin: views do not fit together"
     threshold = (
         f"{AGAINST:.0%} of the site's points; or {OF_SCAN:.1%} of the scan's, for sites no deeper than {EXPLAINED:g} "
-        "distances of the two"
+        f"distances of the two, or {EXPLAINED_BY_MANY:g} from {MANY:.0%} on"
     )
     remedy = "register the views again, or give them as a list of files"
     topic = "views"

@@ -61,6 +61,9 @@ flanks; of 20 misplaced views 0.012 to 0.32, but for three that overlap little."
 EXPLAINED = 2.5
 """Depth of a site, in distances of the two surfaces, up to which the misplaced view explains it: where only one view
 shows the skin, it lies too deep by more than it does across the view where both show it."""
+MANY, EXPLAINED_BY_MANY = 0.1, 4.0
+"""Share of all points on two surfaces from which the views are far apart, and the depth that they explain then. Where
+both show skin that lies along the motion, the two surfaces are nearer to each other than the views are."""
 MOST_COMPARED = 300_000
 """Points of a scan, chosen at random, among which these are asked: two surfaces are two in few points as well."""
 
@@ -78,7 +81,8 @@ class Sheets(NamedTuple):
 
     def explain(self, own: float, depth: float) -> bool:
         """Whether they explain a site: the share of its ``own`` points among them, and its typical ``depth``."""
-        return own > AGAINST or (self.disagree and depth < EXPLAINED * self.apart)
+        reach = EXPLAINED_BY_MANY if self.share > MANY else EXPLAINED
+        return own > AGAINST or (self.disagree and depth < reach * self.apart)
 
 
 class SheetPlaces(NamedTuple):
