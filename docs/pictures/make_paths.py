@@ -80,7 +80,7 @@ def draw_layer(axes: Axes, rows: Any, flat: Floats, lean: Floats, layer: int) ->
     own = np.flatnonzero((rows["on"] > 0) & (rows["layer"] == layer))
     for bead in np.split(own, np.flatnonzero(np.diff(own) > 1) + 1):
         line = np.concatenate([[bead[0] - 1], bead])
-        axes.plot(*flat[line].T, lw=1.1, color=plt.cm.tab10(beads % 10))  # type: ignore[attr-defined]
+        axes.plot(*flat[line].T, lw=1.1, color=plt.cm.tab10(beads % 10))
         axes.plot(*flat[line[0]], "o", ms=5, color="black")
         tilted = line[lean[line] > LEANS]
         axes.plot(*flat[tilted].T, ".", ms=2.5, color="red")
