@@ -32,16 +32,17 @@ ON = 0.05
 """Distance from the lost skin, in tolerances, up to which a place is on it."""
 ALIKE = 1.5
 """Depth of another site, in depths of the one along the edges, up to which the same explains it."""
-SHOWN = 3.0
-"""Distance of a scan point, in spacings or tolerances, up to which an edge is shown."""
+SHOWN, HALF = 3.0, 0.5
+"""Distance of a scan point, in spacings or tolerances, up to which an edge is shown; and the share of all sharp edges
+that the scan shows at least, for it to tell: the one cutting edge that a scan shows may well be worn."""
 
 
 class RoundedEdges(Rule):
     code = "rounded_edges"
     meaning = "the site runs along nearly all sharp edges: the scan was smoothed, or the part's edges are broken"
     threshold = (
-        f"{ALL:.0%} of the sharp edges that the scan shows, and no other skin. Other sites up to {ALIKE:g} times "
-        "as deep may have the same cause"
+        f"{ALL:.0%} of the sharp edges that the scan shows, half of them at least, and no other skin. Other "
+        f"sites up to {ALIKE:g} times as deep may have the same cause"
     )
     remedy = "scan without smoothing; or draw the broken edges into the CAD part"
     topic = "wear"
@@ -86,7 +87,7 @@ def measure_edges(damage: Solid, field: ScanField) -> float:
     if away > BESIDE * usual:
         return 0.0
     shown = places[_is_shown(places, field)]
-    if not len(shown):
+    if len(shown) < HALF * len(places):
         return 0.0
     return float((distance_to_mesh(shown, take_lost_skin(damage, inner)) < ON * field.tolerance).mean())
 
