@@ -104,8 +104,8 @@ def test_rings_far_from_each_other_stay_apart() -> None:
     assert len(merge_rings([rings[0], rings[0] + np.array([9 + 1.2 * BEAD.step, 0.0])], BEAD.step)) == 1
 
 
-def test_a_ring_that_shrinks_to_a_place_is_left_out() -> None:
-    """It has no direction in which it could be joined with the line beside it."""
+def test_a_ring_that_shrinks_to_a_place_is_not_joined() -> None:
+    """It has no direction in which it could be; what is too short for a pass is said of the place."""
     row = Line(np.array([[0.0, 0.0], [5.0, 0.0]]), "row")
     place = Line(np.full((5, 2), 5.5) * [1.0, 0.0], "ring")
-    assert [len(line.points) for line in join_all([row, place], None, BEAD)] == [2]
+    assert [len(line.points) for line in join_all([place, row], None, BEAD)] == [2, 5]

@@ -111,11 +111,12 @@ def part_lines(lines: Sequence[Line], bead: Bead) -> list[Line]:
 
 def join_all(lines: Sequence[Line], within: Any, bead: Bead) -> list[Line]:
     """The lines, joined where their ends are near; a joined one is what most of it is."""
-    # rings that shrink to a place have no direction in which they could be joined
+    # a place has no direction in which it could be joined
+    places = [line for line in lines if measure_length(line.points) <= 1e-6 * bead.width]
     lines = [line for line in lines if measure_length(line.points) > 1e-6 * bead.width]
     joined = join_ends([line.points for line in lines], within, bead.width)
     long = [measure_length(line.points) for line in lines]
-    return [Line(points, lines[max(numbers, key=lambda k: long[k])].kind) for points, numbers in joined]
+    return [*[Line(points, lines[max(numbers, key=lambda k: long[k])].kind) for points, numbers in joined], *places]
 
 
 def _measure_aspect(region: Any) -> float:
