@@ -13,6 +13,7 @@ from damageest_paths.fill.merging import merge_rings
 from damageest_paths.fill.regions import cover, make_region, measure_length
 from damageest_paths.fill.rings import list_levels, soften
 from damageest_paths.fill.stripes import Bead
+from damageest_paths.fill.trim import crosses
 from damageest_paths.fill.weave import join_all
 from manifold3d import CrossSection, OpType
 
@@ -109,3 +110,10 @@ def test_a_ring_that_shrinks_to_a_place_is_not_joined() -> None:
     row = Line(np.array([[0.0, 0.0], [5.0, 0.0]]), "row")
     place = Line(np.full((5, 2), 5.5) * [1.0, 0.0], "ring")
     assert [len(line.points) for line in join_all([place, row], None, BEAD)] == [2, 5]
+
+
+def test_a_line_crosses_no_place() -> None:
+    row = np.array([[0.0, 0.0], [5.0, 0.0]])
+    assert not crosses(row, row[:0])
+    assert not crosses(row[:1], row)
+    assert crosses(row, np.array([[2.0, -1.0], [2.5, 1.0]]))

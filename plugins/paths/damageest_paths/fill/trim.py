@@ -60,6 +60,8 @@ def cut_ring(ring: Floats, region: Any, width: float) -> list[Floats]:
 
 def crosses(line: Floats, other: Floats) -> bool:
     """Whether a side of one polyline (K,2) properly crosses a side of another (M,2)."""
+    if min(len(line), len(other)) < 2:
+        return False
     first, second = _keep_near(line, other), _keep_near(other, line)
     a, b = first[:, None, 0], first[:, None, 1]
     c, d = second[None, :, 0], second[None, :, 1]
