@@ -11,9 +11,9 @@ from damageest.artefacts import Ints
 from damageest.errors import InputError
 from damageest.io.points import PointFile
 
-MOST = 0.75
-"""Share of loose vertices up to which they are no part of the scan. Where more are loose, the file holds points, and
-some faces beside them."""
+MOST, FEWEST = 0.75, 100
+"""Share of loose vertices up to which they are no part of the scan, and vertices in faces at least. Where more are
+loose, or few are in faces, the file holds points, and some faces beside them."""
 
 
 def drop_loose(file: PointFile, corners: Iterable[Ints]) -> PointFile:
@@ -27,7 +27,7 @@ def drop_loose(file: PointFile, corners: Iterable[Ints]) -> PointFile:
     except (ValueError, InputError):
         return file
     loose = count - int(is_used.sum())
-    if not loose or loose > MOST * count:
+    if not loose or loose > MOST * count or count - loose < FEWEST:
         return file
     note = f"{loose:,} of {count:,} vertices belong to no face of the mesh: they are left out"
     return replace(file.take(is_used), notes=(*file.notes, note))
