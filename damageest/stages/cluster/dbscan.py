@@ -25,9 +25,9 @@ it."""
 FEWEST_DENSE, FAR = 4, 2.0
 """Points within eps, itself included, that make a point dense in the sparsest scan. There the walls of a loss in a thin
 plate show too few: points that are in no site belong to one that they reach by steps of so many eps."""
-MOST_STRAY = 0.25
-"""Points in no site that do not reach one, as a share of those that do, up to which these belong to it. Where more lie
-anywhere, they are stray."""
+MOST_STRAY, MOST_SITES = 0.25, 5
+"""Points in no site that do not reach one, as a share of those that do, and sites, up to which these belong to them.
+Where more lie anywhere, or sites lie everywhere, they are stray."""
 MAX_FOR_ALL = 200_000
 """Number of scan points above which the gaps between them are measured at few places only."""
 
@@ -170,7 +170,8 @@ def _reach_out(points: Floats, cluster: Ints, reach: float) -> Ints:
             break
         out[left[reached]] = out[found[nearest[reached]]]
     stray = int((out < 0).sum())
-    return out if stray <= MOST_STRAY * ((cluster < 0).sum() - stray) else cluster
+    is_stray = stray > MOST_STRAY * ((cluster < 0).sum() - stray) or len(np.unique(out[out >= 0])) > MOST_SITES
+    return cluster if is_stray else out
 
 
 def _is_supported(points: Floats, damage: Ints, is_damage: NDArray[np.bool_], reach: float) -> NDArray[np.bool_]:

@@ -28,7 +28,7 @@ the rim of a loss. Half discs lie 1.2 apart, twice six points drawn at random 0.
 AMONG = 1.3
 """Mean distance of the points of one surface along the skin, in those of the other, up to which they lie among each
 other. In a groove that is narrower than the neighbourhood, the upper ones lie on both sides and farther."""
-SMOOTH = 0.25
+SMOOTH = 0.15
 """Least share of the variance of the points' depths that a smooth surface, of second degree along the skin, leaves. Of
 views that do not fit together it leaves 0.33 to 0.82 (one in ten less, one in ten more); of sparse points on fillets,
 whose radius is off, 0.02 to 0.32."""
