@@ -102,4 +102,4 @@ def test_a_waved_face_between_sparse_points_is_one_surface() -> None:
     points[top, 2] = TOP - 0.48 * TOLERANCE * (1 - np.cos(2 * np.pi * points[top, 0] / 4))
     field = compare(points)
     thinned = replace(field, aligned=replace(field.aligned, noise=0.005, spacing=1.14))
-    assert measure_sheets(thinned).share < OF_SCAN / 2
+    assert measure_sheets(thinned).share < 0.75 * OF_SCAN
