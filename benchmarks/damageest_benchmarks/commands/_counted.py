@@ -61,9 +61,15 @@ def write_measured(table: str, name: str, write: Path | None) -> None:
     from damageest_benchmarks.readme import replace_between_marks
 
     if write:
-        words = [word for word in sys.argv[1:] if not word.startswith("--write")]
-        measured = describe_measurement(f"`{shlex.join(['damageest', *words])}`")
+        measured = describe_measurement(f"`{shlex.join(['damageest', *leave_out_files(sys.argv[1:])])}`")
         write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", name), encoding="utf-8")
+
+
+def leave_out_files(words: list[str]) -> list[str]:
+    """The words of a command without the files of this machine, --write and --out."""
+    files = {"--write", "--out"}
+    pairs = zip(["", *words], words, strict=False)
+    return [word for before, word in pairs if before not in files and word.partition("=")[0] not in files]
 
 
 def parse_numbers(option: str, text: str) -> list[int]:

@@ -85,16 +85,9 @@ def _measure_whole(
 def _write(write: Path | None, table: str, mark: str) -> None:
     from damageest_evaluate.tables import describe_measurement
 
+    from damageest_benchmarks.commands._counted import leave_out_files
     from damageest_benchmarks.readme import replace_between_marks
 
     if write:
-        measured = describe_measurement(f"`{shlex.join(['damageest', *_leave_out_write(sys.argv[1:])])}`")
+        measured = describe_measurement(f"`{shlex.join(['damageest', *leave_out_files(sys.argv[1:])])}`")
         write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", mark), encoding="utf-8")
-
-
-def _leave_out_write(words: list[str]) -> list[str]:
-    return [
-        word
-        for before, word in zip(["", *words], words, strict=False)
-        if before != "--write" and word.partition("=")[0] != "--write"
-    ]
