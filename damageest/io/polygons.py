@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import Floats, Ints
 from damageest.errors import InputError
 from damageest.geometry.polygons import triangulate_polygons
-from damageest.io.points.corners import CORNERS, join_obj_lines, read_obj_corners, read_off_corners
+from damageest.io.points.corners import find_faces, join_obj_lines, read_obj_corners, read_off_corners
 
 _OWN_OBJ = re.compile(rb"^[ \t]*fo?(?:(?:[ \t]+[^\s#]+){4}|(?:[ \t]+[^\s#]+){0,2}[ \t]+(?:-|0[\s/]))", re.MULTILINE)
 """A face of four corners, or by numbers that count backward or from 0, which trimesh takes from the end of the file."""
@@ -52,7 +52,8 @@ def _read_obj(path: Path) -> Polygons:
 def _read_off(path: Path) -> Polygons:
     from damageest.io.points.off import read_off_rows
 
-    return read_off_rows(path)[0][:, :3], *read_off_corners(path)
+    vertices, faces, expected, _ = read_off_rows(path)
+    return vertices[:, :3], *read_off_corners(path, faces, expected)
 
 
 def _read_ply(path: Path) -> Polygons | None:
@@ -61,15 +62,12 @@ def _read_ply(path: Path) -> Polygons | None:
     from damageest.io.points.ply_lists import read_lists
 
     header = read_header(path)
-    for element in header.elements:
-        names = [one.name for one in element.lists]
-        name = next((one for one in names if one in CORNERS), None)
-        if element.name in ("face", "tristrips") and name is not None:
-            corners, count = read_lists(path, header, element, name)
-            if element.name == "tristrips":
-                corners = _divide_strips(corners, count)
-                count = np.full(len(corners) // 3, 3)
-            return read_vertices(path, header).points, corners, count
+    for element, name in find_faces(header):
+        corners, count = read_lists(path, header, element, name)
+        if element.name == "tristrips":
+            corners = _divide_strips(corners, count)
+            count = np.full(len(corners) // 3, 3)
+        return read_vertices(path, header).points, corners, count
     return None
 
 

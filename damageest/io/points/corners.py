@@ -10,8 +10,7 @@ import numpy as np
 
 from damageest.artefacts import Ints
 from damageest.errors import InputError
-from damageest.io.points.off import read_off_rows
-from damageest.io.points.ply_header import Header
+from damageest.io.points.ply_header import Element, Header
 from damageest.io.points.ply_lists import walk_lists
 
 _OBJ_FACE = re.compile(rb"^[ \t]*fo?[ \t]+([^\n#]*)", re.MULTILINE)
@@ -20,20 +19,28 @@ CORNERS = ("vertex_indices", "vertex_index")
 """Names of the list of a face's vertices in a PLY file."""
 
 
-def list_corners(path: Path) -> Iterable[Ints]:
-    """The corners (C,) of all faces of an OBJ or OFF file, in one piece. Raises as the functions below."""
-    if path.suffix.lower() == ".off":
-        yield read_off_corners(path)[0]
-    else:
-        yield read_obj_corners(path, join_obj_lines(path.read_bytes()))[0]
+def list_obj_corners(path: Path, data: bytes) -> Iterable[Ints]:
+    """The corners (C,) of all faces in the text of an OBJ file, in one piece. Raises as `read_obj_corners`."""
+    yield read_obj_corners(path, join_obj_lines(data))[0]
+
+
+def list_off_corners(path: Path, lines: list[bytes], expected: int) -> Iterable[Ints]:
+    """The corners (C,) of all faces of an OFF file, in one piece. Raises as `read_off_corners`."""
+    yield read_off_corners(path, lines, expected)[0]
 
 
 def list_ply_corners(path: Path, header: Header) -> Iterable[Ints]:
     """The corners of the faces of a PLY file in pieces; none where it has no faces."""
+    for element, name in find_faces(header):
+        yield from walk_lists(path, header, element, name)
+
+
+def find_faces(header: Header) -> Iterable[tuple[Element, str]]:
+    """The elements of a PLY file that are faces, with the name of the list of their vertices."""
     for element in header.elements:
         name = next((one.name for one in element.lists if one.name in CORNERS), None)
-        if element.name in ("face", "tristrips") and name is not None and element.count:
-            yield from walk_lists(path, header, element, name)
+        if element.name in ("face", "tristrips") and name is not None:
+            yield element, name
 
 
 def join_obj_lines(data: bytes) -> bytes:
@@ -59,11 +66,10 @@ def read_obj_corners(path: Path, data: bytes) -> tuple[Ints, Ints]:
     return corners, count
 
 
-def read_off_corners(path: Path) -> tuple[Ints, Ints]:
-    """The corners (C,) of all faces of an OFF file, and how many (F,) each has. Raises InputError where some are cut
-    off."""
-    _, faces, expected, _ = read_off_rows(path)
-    rows = [row.split() for row in faces[:expected]]
+def read_off_corners(path: Path, lines: list[bytes], expected: int) -> tuple[Ints, Ints]:
+    """The corners (C,) of all faces of an OFF file, and how many (F,) each has, from the lines after its vertices and
+    the number of faces that it says. Raises InputError where some are cut off."""
+    rows = [row.split() for row in lines[:expected]]
     count = np.array([int(row[0]) for row in rows], np.int64)
     if len(rows) < expected or any(len(row) <= int(row[0]) for row in rows):
         raise InputError(f"{path}: the OFF file is truncated: it has {len(rows)} of {expected} whole faces")

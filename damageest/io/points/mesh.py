@@ -14,7 +14,7 @@ from damageest.artefacts import Floats
 from damageest.geometry.duplicates import find_duplicates
 from damageest.io.points import FormatError, PointFile
 from damageest.io.points.attributes import find_unit, scale_colours
-from damageest.io.points.corners import list_corners
+from damageest.io.points.corners import list_obj_corners, list_off_corners
 from damageest.io.points.loose import drop_loose
 from damageest.io.points.off import read_off_rows
 from damageest.io.points.text import parse_numbers
@@ -26,9 +26,8 @@ NOTE = "the file is a mesh; its vertices are used as the scan's points"
 def read(path: Path, columns: str | None = None) -> PointFile:
     """The vertices of the mesh's faces."""
     readers = {".stl": _read_stl, ".obj": _read_obj, ".off": _read_off, ".3mf": _read_3mf}
-    suffix = path.suffix.lower()
-    file = replace(readers[suffix](path), notes=(NOTE,))
-    return drop_loose(file, list_corners(path)) if suffix in (".obj", ".off") else file
+    file = readers[path.suffix.lower()](path)
+    return replace(file, notes=(NOTE, *file.notes))
 
 
 def _read_stl(path: Path) -> PointFile:
@@ -46,7 +45,8 @@ def _read_obj(path: Path) -> PointFile:
     unit, said = find_unit([line.decode("latin-1").lstrip("#") for line in re.findall(rb"^#.*$", data[:4096], re.M)])
     table = read_obj_vertices(data)
     colours = scale_colours(table[:, 3:6]) if table.shape[1] in (6, 7) else None  # not a weight alone
-    return PointFile(table[:, :3], colours=colours, unit=unit, unit_said=said)
+    file = PointFile(table[:, :3], colours=colours, unit=unit, unit_said=said)
+    return drop_loose(file, list_obj_corners(path, data))
 
 
 def read_obj_vertices(data: bytes) -> Floats:
@@ -65,8 +65,8 @@ def read_obj_vertices(data: bytes) -> Floats:
 def _read_off(path: Path) -> PointFile:
     comments = re.findall(rb"#([^\r\n]*)", path.read_bytes()[:4096])
     unit, said = find_unit([line.decode("latin-1") for line in comments])
-    table, _, _, mark = read_off_rows(path)
+    table, faces, expected, mark = read_off_rows(path)
     coloured = mark == "C" and table.shape[1] >= 6
-    return PointFile(
-        table[:, :3], colours=scale_colours(table[:, 3:6]) if coloured else None, unit=unit, unit_said=said
-    )
+    colours = scale_colours(table[:, 3:6]) if coloured else None
+    file = PointFile(table[:, :3], colours=colours, unit=unit, unit_said=said)
+    return drop_loose(file, list_off_corners(path, faces, expected))
