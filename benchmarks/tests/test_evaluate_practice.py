@@ -84,6 +84,13 @@ def test_air_under_the_first_layer_is_a_share_of_its_height(air: float, floating
     assert found.floating == floating
 
 
+def test_an_oblique_tool_puts_no_air_under_a_bead() -> None:
+    bead = line((-10, 0), (10, 0))
+    found = ask(bead, axes=np.tile([np.sin(1.0), 0.0, np.cos(1.0)], (len(bead), 1)))
+    assert found.air_95 == pytest.approx(0, abs=1e-9)
+    assert found.floating == 0
+
+
 def test_a_second_layer_lies_on_the_first() -> None:
     found = ask(line((-10, 0), (10, 0)), line((-10, 0), (10, 0), 2.5 * HEIGHT), layers=[1, 2])
     assert found.floating == pytest.approx(0.5, abs=0.05)

@@ -112,22 +112,25 @@ def _measure_axes(path: DepositPath, beads: list[Ints]) -> tuple[float, int, flo
 
 
 def _measure_air(path: DepositPath, metal: Solid) -> tuple[Floats, Flags]:
-    """The air (K,) under deposited points, in bead heights, and whether metal, not a bead, lies below each (K,)."""
+    """The air (K,) under deposited points, in bead heights, and whether metal, not a bead, lies below each (K,).
+
+    Below is against the layer's normal: along an oblique tool a bead that lies on metal seems to be above air.
+    """
     on = np.flatnonzero(path.on)
     chosen = on[:: max(1, len(on) // MOST)]
     height = path.sizes[chosen, 1]
-    to_metal = RayCaster(metal).find_first(path.points[chosen], -path.axes[chosen])[0]
+    to_metal = RayCaster(metal).find_first(path.points[chosen], -path.normals[chosen])[0]
     to_bead = np.array([_find_bead_below(path, on, k) for k in chosen])
     air = np.maximum(np.minimum(to_metal, to_bead) - height, 0) / height
     return air, to_metal < to_bead
 
 
 def _find_bead_below(path: DepositPath, on: Ints, k: int) -> float:
-    """The distance from point ``k`` down its axis to the bead of an earlier layer there; inf where there is none."""
+    """The distance from point ``k`` against the layer's normal to the bead of an earlier layer; inf without one."""
     earlier = on[on < k]
     earlier = earlier[(path.layer[earlier] < path.layer[k]) | (path.part[earlier] < path.part[k])]
     way = path.points[k] - path.points[earlier]
-    up = way @ path.axes[k]
-    beside = np.linalg.norm(way - up[:, None] * path.axes[k], axis=1)
+    up = way @ path.normals[k]
+    beside = np.linalg.norm(way - up[:, None] * path.normals[k], axis=1)
     below = up[(beside < BESIDE * path.width) & (up > 0)]
     return float(below.min()) if len(below) else float("inf")

@@ -8,7 +8,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 from damageest_paths.fill.fill import fill_region, list_lines
-from damageest_paths.fill.joints import find_reversals
+from damageest_paths.fill.joints import drop_spurs, end_at_reversals, find_reversals, round_corners
 from damageest_paths.fill.regions import cover, list_pieces, make_region, measure_length
 from damageest_paths.fill.stripes import Bead
 from damageest_paths.fill.weave import Pattern
@@ -49,6 +49,50 @@ def test_beads_cover_the_region_and_little_else(name: str, pattern: Pattern) -> 
     assert max((gap.area() for gap in gaps.decompose()), default=0) <= 0.1 * BEAD.width**2
     assert not any(find_reversals(line, BEAD.width) for line in lines)
     assert (covered - region.offset(BEAD.width)).area() <= 1e-6
+
+
+def measure_turns(line: Floats) -> Floats:
+    """The turns of a line in degrees, between the first points of its stretches of a tenth of a bead's width."""
+    way = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
+    sides = np.diff(line[np.unique(np.floor(way / (0.1 * BEAD.width)), return_index=True)[1]], axis=0)
+    unit = sides / np.linalg.norm(sides, axis=1)[:, None]
+    return np.asarray(np.degrees(np.arccos(np.clip(np.einsum("ij,ij->i", unit[1:], unit[:-1]), -1, 1))))
+
+
+def make_blob(rng: np.random.Generator) -> Any:
+    """A region with a wavy border, long or round."""
+    angle, number = np.linspace(0, 2 * np.pi, 90, endpoint=False), np.arange(1, 9)[:, None]
+    waves = rng.uniform(-0.3, 0.3, (8, 1)) / number * np.cos(number * angle + rng.uniform(0, 6, (8, 1)))
+    radius = np.maximum(rng.uniform(2, 6) * (1 + waves.sum(axis=0)), 0.3)
+    return make_region([np.column_stack([radius * np.cos(angle), rng.uniform(0.3, 1) * radius * np.sin(angle)])])
+
+
+@pytest.mark.parametrize("seed", [11, 47, 91, 106])
+def test_no_pass_comes_back_on_itself_where_metal_is_in_the_way(seed: int) -> None:
+    """Lines that are moved aside from metal had hooks, and rings one where they close."""
+    rng = np.random.default_rng(seed)
+    region = make_blob(rng)
+    free = region.offset(0.2)
+    for _ in range(3):
+        free -= make_blob(rng).scale((0.15, 0.15)).translate(tuple(rng.uniform(-4, 4, 2)))
+    lines = list_lines(region, "zigzag", BEAD, float(rng.uniform(0, 3)), free, 0.5, region)
+    assert lines
+    assert all(measure_turns(line.points).max(initial=0.0) < 150 for line in lines if len(line.points) > 2)
+
+
+def test_a_closed_line_with_round_corners_ends_where_it_begins() -> None:
+    square = np.array([[0, 0], [4, 0], [4, 4], [0, 4], [0, 0]], float)
+    line = round_corners(square, BEAD.width)
+    assert np.allclose(line[0], line[-1])
+    assert measure_turns(line).max() < 90
+    assert measure_turns(np.concatenate([line, line[1:4]])).max() < 90
+
+
+def test_a_spur_is_left_out() -> None:
+    line = np.array([[0, 0], [3, 0], [3.1, 0.01], [3, 0.02], [3, 3]], float)
+    assert drop_spurs(line, BEAD.width).tolist() in ([[0, 0], [3, 0], [3, 3]], [[0, 0], [3, 0], [3, 0.02], [3, 3]])
+    long = np.array([[0, 0], [3, 0], [1, 0.1]], float)
+    assert len(end_at_reversals(long, BEAD.width)) == 2
 
 
 def count_crossings(line: Floats, other: Floats) -> int:

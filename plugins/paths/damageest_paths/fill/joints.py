@@ -152,8 +152,23 @@ def find_reversals(line: Floats, width: float) -> list[int]:
     return sorted(set(corner[turn < np.cos(REVERSAL)].tolist()))
 
 
+def drop_spurs(line: Floats, width: float) -> Floats:
+    """The line (K,2) without corners to which it goes over a short stretch and comes back from."""
+    while len(line) > 3:
+        sides = np.diff(line, axis=0)
+        long = np.linalg.norm(sides, axis=1)
+        unit = sides / np.maximum(long, 1e-300)[:, None]
+        turn = np.einsum("ij,ij->i", unit[1:], unit[:-1])
+        is_spur = (turn < np.cos(REVERSAL)) & (np.minimum(long[1:], long[:-1]) < WINDOW * width)
+        if not is_spur.any():
+            break
+        line = np.delete(line, 1 + int(np.argmin(np.where(is_spur, turn, 1.0))), axis=0)
+    return line
+
+
 def end_at_reversals(line: Floats, width: float) -> list[Floats]:
-    """The line, or its pieces between the places at which it comes back on itself."""
+    """The line without spurs, or its pieces between the places at which it comes back on itself."""
+    line = drop_spurs(line, width)
     cuts = find_reversals(line, width)
     if not cuts:
         return [line]
@@ -173,7 +188,8 @@ def round_corners(line: Floats, width: float) -> Floats:
     if len(line) < 3:
         return line
     closed = is_closed(line)
-    ring = np.concatenate([line[-2:-1], line, line[1:2]]) if closed else line
+    # of a closed one the first corner comes once: its last move ends where the arc there begins
+    ring = np.concatenate([line[-2:-1], line[:-1], line[:1]]) if closed else line
     before, after = ring[1:-1] - ring[:-2], ring[2:] - ring[1:-1]
     long = np.linalg.norm(before, axis=1), np.linalg.norm(after, axis=1)
     ahead, behind = after / long[1][:, None], before / long[0][:, None]
@@ -195,7 +211,7 @@ def round_corners(line: Floats, width: float) -> Floats:
         )
         found += [start[None], middle + arc, stop[None]]
     if closed:
-        whole = np.concatenate(found)
-        # begins where the ring began
-        return np.concatenate([whole, whole[:1]])
-    return np.concatenate([*found, line[-1:]])
+        found.append(found[0][:1])
+    else:
+        found.append(line[-1:])
+    return np.concatenate(found)
