@@ -2,6 +2,7 @@
 
 # axes.py: chooses the tool axes of passes so that the nozzle touches nothing
 # boxes.py: a tree of boxes over the triangles of obstacles, in which distances to the nozzle are found
+# bridging.py: bridges the breaks of passes, where the tool turns over a longer way
 # clearance.py: how far the nozzle stays from what it must not touch
 # compiling.py: functions that the Numba library compiles
 # descent.py: bounds on the distance of a nozzle that is a solid of revolution

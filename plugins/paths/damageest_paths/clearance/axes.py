@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest.geometry.vectors import normalise
+from damageest_paths.clearance.bridging import LONGER, PLACES, list_bridges
 from damageest_paths.clearance.clearance import Clearance
 from damageest_paths.clearance.pose_table import PoseTable
 from damageest_paths.clearance.turning import BLOCKED, Course, cost_poses, plan_course
@@ -89,6 +91,7 @@ def choose_axes(
         going = _share_axes(found, lines, table, first, clearance, limits)
         _let_turn(found, going, lines, table, clearance, limits)
         if limits.eases:
+            _bridge(found, lines, clearance, limits)
             _ease(found, lines, clearance, limits)
     return [_cut(one, limits) for one in found]
 
@@ -158,6 +161,34 @@ def _let_turn(
             break
 
 
+def _bridge(found: list[_Found], lines: Sequence[Floats], clearance: Clearance, limits: Limits) -> None:
+    """Replaces what was found for passes with breaks: the tool turns over them where that is free."""
+    for shape in product(LONGER, PLACES):
+        bridges = [
+            bridge
+            for k, (one, line) in enumerate(zip(found, lines, strict=True))
+            if not _is_free(one, limits)
+            for bridge in list_bridges(k, line, one.course.axes, _goes_on(one, limits), limits.rate, shape)
+        ]
+        if not bridges:
+            continue
+        courses = [Course(each.axes, np.ones(len(each.axes) - 1, bool)) for each in bridges]
+        spans = [lines[each.number][each.start : each.stop] for each in bridges]
+        for each, tried in zip(bridges, _measure(courses, spans, clearance, limits), strict=True):
+            if _is_free(tried, limits):
+                course, gaps, between = found[each.number]
+                course.axes[each.start : each.stop] = tried.course.axes
+                course.joined[each.start : each.stop - 1] = True
+                gaps[each.start : each.stop] = tried.gaps
+                between[each.start : each.stop - 1] = tried.between
+
+
+def _goes_on(one: _Found, limits: Limits) -> Flags:
+    """Whether (N-1,) a pass goes on from each point to the next."""
+    free = one.gaps >= limits.needed
+    return np.asarray(free[:-1] & free[1:] & one.course.joined & (one.between >= limits.needed))
+
+
 def _ease(found: list[_Found], lines: Sequence[Floats], clearance: Clearance, limits: Limits) -> None:
     """Replaces what was found for passes along which the tool is tilted by the least share of that at which they are
     free."""
@@ -217,7 +248,7 @@ def _measure(courses: Sequence[Course], lines: Sequence[Floats], clearance: Clea
 def _cut(one: _Found, limits: Limits) -> list[Piece]:
     """The pieces of a pass that are free, without those that are too short."""
     free = one.gaps >= limits.needed
-    goes_on = free[:-1] & free[1:] & one.course.joined & (one.between >= limits.needed)
+    goes_on = _goes_on(one, limits)
     least = np.minimum(one.gaps, np.append(one.between, np.inf))
     pieces = []
     for start, stop in _list_runs(free, goes_on):
