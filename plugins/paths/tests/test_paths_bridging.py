@@ -70,7 +70,7 @@ def test_bridges_do_not_overlap_and_keep_within_two_breaks(places: list[int], wi
             assert np.ptp(broken) == len(broken) - 1
 
 
-@pytest.mark.parametrize(("radius", "depth", "cone", "standoff"), [(7, 4, 35.0, 3.0), (6, 6, 30.0, 4.0)])
+@pytest.mark.parametrize(("radius", "depth", "cone", "standoff"), [(7, 4, 35.0, 3.0), (6, 3, 35.0, 3.0)])
 def test_a_ring_beside_the_wall_of_a_pocket_is_one_pass(
     radius: float, depth: float, cone: float, standoff: float
 ) -> None:
@@ -80,4 +80,4 @@ def test_a_ring_beside_the_wall_of_a_pocket_is_one_pass(
     path = plan(pocket, direction=(0, 0, 1), axes=5, nozzle=fat, standoff=standoff)
     assert path.passes == path.layers == depth
     assert path.unreached_volume < 0.001 * path.deposit_volume
-    assert measure_nozzle(path, pocket.left, 0.05) > 0
+    assert measure_nozzle(path, pocket.left, 0.2) > 0
