@@ -239,7 +239,7 @@ class Layers(Path):
         from damageest_paths.drafts import Draft, Task, draft_path
         from damageest_paths.fill.stripes import Bead
         from damageest_paths.foot import raise_beads
-        from damageest_paths.form_choice import plan_in_form
+        from damageest_paths.form_choice import is_thin_shell, plan_in_form
         from damageest_paths.laid import simulate_laid
         from damageest_paths.layering.directions import Planner, find_open_normal
         from damageest_paths.process.process import Cooling, Process
@@ -286,7 +286,7 @@ class Layers(Path):
             chosen = find_open_normal(body, left, tolerance) if along_normal and direction is None else direction
             return draft_path(task, nozzle, self.standoff or self.width, process, self.simulate, chosen, planner)
 
-        draft = plan_in_form(self.layers, plan, self.penetration is not None)
+        draft = plan_in_form(self.layers, plan, is_thin_shell(body, self.height), self.penetration is not None)
         if self.layers == "conformal" and draft.is_empty:
             why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")

@@ -10,10 +10,10 @@ import pytest
 from damageest_benchmarks.paths.check import measure_nozzle
 from damageest_paths import assemble, form_choice
 from damageest_paths.drafts import MUCH_SUNK
-from damageest_paths.form_choice import MOST_LEFT, PLANNERS, POOR, measure_lost
+from damageest_paths.form_choice import MOST_LEFT, PLANNERS, POOR, count_planes, is_thin_shell, measure_lost
 from damageest_paths.process.process import Pass
 from damageest_paths.travel.moves import Moves, join_passes
-from manifold3d import CrossSection
+from manifold3d import CrossSection, Manifold
 from path_cavities import pocket, stair
 
 from damageest.artefacts import DepositPath
@@ -48,6 +48,43 @@ def test_where_planes_lose_much_layers_follow_the_floor(joined: list[int]) -> No
     assert paths["auto"].layer_form == "conformal"
     assert measure_lost(paths["auto"]) < measure_lost(paths["planar"]) / 2
     assert measure_nozzle(paths["auto"], loss.left, 0.2) > 0
+
+
+def worn_shaft() -> Loss:
+    """A shaft, worn to one side by less than a millimetre."""
+    shaft = Manifold.cylinder(6, 6, 6, 96)
+    return cut(shaft, shaft - Manifold.cylinder(6, 6, 6, 96).translate((-0.8, 0, 0)))
+
+
+@pytest.mark.slow
+def test_planes_are_not_planned_of_a_thin_shell_that_layers_along_its_floor_fill(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(PLANNERS, "planar", None)
+    loss = worn_shaft()
+    assert is_thin_shell(loss.lost, 0.4)
+    path = plan(loss, axes=5, layers="auto", height=0.4, width=0.8, standoff=2.0)
+    assert path.layer_form == "conformal"
+    assert measure_lost(path) < POOR
+    assert any("in planes at least" in note for note in path.notes)
+
+
+@pytest.mark.parametrize(("height", "count"), [(1.0, 4), (0.8, 5), (3.0, 2)])
+def test_planes_are_counted_across_the_least_extent(height: float, count: int) -> None:
+    from damageest.geometry.solids import to_solid
+
+    plate = to_solid(Manifold.cube((20, 14, 4)).rotate((20, 30, 40)))
+    assert plate is not None
+    assert count <= count_planes(plate, height) <= count + 1
+
+
+def test_planes_of_two_pieces_are_counted_in_a_direction_each() -> None:
+    from damageest.geometry.solids import to_solid
+
+    plate = Manifold.cube((20, 14, 2), True)
+    both = to_solid(plate + plate.rotate((90, 0, 0)).translate((0, 30, 0)))
+    assert both is not None
+    assert 4 <= count_planes(both, 1.0) <= 6
 
 
 @pytest.mark.slow

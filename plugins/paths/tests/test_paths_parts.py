@@ -9,6 +9,7 @@ import pytest
 from damageest_benchmarks.paths.check import measure_built, measure_nozzle
 from damageest_paths.clearance.clearance import Clearance
 from damageest_paths.clearance.obstacles import Obstacles, draw_passes
+from damageest_paths.fill.regions import cover, make_region
 from damageest_paths.process.process import Pass
 from damageest_paths.tool.nozzle import Cone, Nozzle, make_nozzle, make_nozzle_mesh
 from damageest_paths.travel.exits import Travel
@@ -103,6 +104,25 @@ def test_beads_are_drawn_as_they_lie() -> None:
     solid = Solid(mesh.vertices, mesh.faces)
     assert np.allclose(solid.bounds, np.array([[2, -11, 1.5], [4, 11, 2]]), atol=0.05)
     assert np.isclose(solid.volume, (20 * 2 + np.pi) * 0.5, rtol=0.03)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_drawn_beads_hold_all_that_beads_cover_and_little_more(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    turns = np.cumsum(rng.choice([0.0, 0.3, -0.4, 0.7, 1.5, -2.5], 30))
+    steps = rng.choice([0.2, 1.0, 5.0], 30)[:, None] * np.column_stack([np.cos(turns), np.sin(turns)])
+    line = np.column_stack([np.cumsum(steps, axis=0), np.full(30, 2.0)])
+    up = np.tile(UP, (30, 1))
+    passes = [Pass(line[own], up[own], up[own], 0) for own in (slice(17), slice(17, None))]
+    mesh = draw_passes(passes, 2.0, 0.5)
+    assert mesh.vertices[:, 2].min() == pytest.approx(1.5)
+    flat = mesh.vertices[:, :2][mesh.faces]
+    one, other = flat[:, 1] - flat[:, 0], flat[:, 2] - flat[:, 0]
+    area = one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]
+    drawn = make_region(list(flat[area > 1e-9]))
+    beads = cover([one.points[:, :2] for one in passes], 2.0)
+    assert (beads - drawn.offset(1e-6)).area() < 1e-6
+    assert (drawn - beads.offset(0.1 * 2.0)).area() < 1e-6
 
 
 def test_the_check_sees_a_nozzle_in_beads() -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats, Mesh
-from damageest.geometry.vectors import measure_longest_edges
+from damageest.geometry.vectors import measure_longest_edges, normalise
 from damageest_paths.clearance.boxes import Boxes, make_boxes
 from damageest_paths.process.frames import find_across
 from damageest_paths.process.process import Pass
@@ -23,6 +23,13 @@ COARSER = 2.0
 """How much longer these edges are for layers along the floor and for travel than for layers in planes."""
 SIDES = 6
 """Of the half circle at the end of a bead."""
+MITRED = np.radians(45.0)
+"""Turn between two beads up to which both are blocks that are longer by so much that they fill its outer side."""
+BLOCK = np.array(
+    [[0, 1, 2], [0, 2, 3], [4, 6, 5], [4, 7, 6], [0, 4, 5], [0, 5, 1], [1, 5, 6], [1, 6, 2], [2, 6, 7], [2, 7, 3],
+     [3, 7, 4], [3, 4, 0]]
+)  # fmt: skip
+"""Faces of a block with corners 0 to 3 on its top, and 4 to 7 below them."""
 
 
 class Obstacles:
@@ -92,10 +99,31 @@ def draw_beads(start: Floats, stop: Floats, normals: Floats, width: float, heigh
 
 
 def draw_passes(passes: Sequence[Pass], width: float, height: float) -> Mesh:
-    """The beads of passes, see `draw_beads`."""
+    """The beads of passes, as `draw_beads` has them; blocks where one goes on into the next with little of a turn."""
     start = np.concatenate([one.points[:-1] for one in passes])
     stop = np.concatenate([one.points[1:] for one in passes])
-    return draw_beads(start, stop, np.concatenate([one.normals[1:] for one in passes]), width, height)
+    normals = np.concatenate([one.normals[1:] for one in passes])
+    length = np.linalg.norm(stop - start, axis=1)
+    along = (stop - start) / np.maximum(length, 1e-300)[:, None]
+    turn = np.arccos(np.clip(np.einsum("ij,ij->i", along[1:], along[:-1]), -1, 1))
+    turn[np.cumsum([len(one.points) - 1 for one in passes])[:-1] - 1] = np.inf
+    before, after = np.append(np.inf, turn), np.append(turn, np.inf)
+    flat = (np.maximum(before, after) < MITRED) & (length > 1e-12)
+    rest = draw_beads(start[~flat], stop[~flat], normals[~flat], width, height)
+    reach = [width / 2 * np.tan(angle[flat] / 2)[:, None] * along[flat] for angle in (before, after)]
+    blocks = _draw_blocks(start[flat] - reach[0], stop[flat] + reach[1], normals[flat], width, height)
+    return Mesh(
+        np.concatenate([rest.vertices, blocks.vertices]),
+        np.concatenate([rest.faces, blocks.faces + len(rest.vertices)]),
+    )
+
+
+def _draw_blocks(start: Floats, stop: Floats, normals: Floats, width: float, height: float) -> Mesh:
+    """Closed blocks from ``start`` (N,3) to ``stop`` (N,3), both in the middle of their tops."""
+    across = width / 2 * normalise(np.cross(normals, stop - start), 1e-300)
+    top = np.stack([start - across, stop - across, stop + across, start + across], axis=1)
+    corners = np.concatenate([top, top - height * normals[:, None]], axis=1)
+    return Mesh(corners.reshape(-1, 3), (BLOCK + 8 * np.arange(len(start))[:, None, None]).reshape(-1, 3))
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from damageest_paths.holding.follow import follow_line, limit_tilt, make_pass
 from damageest_paths.holding.reach import turn_reach
 from damageest_paths.holding.shade import measure_shade
 from damageest_paths.holding.sweeps import Sweeps
-from damageest_paths.layering.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal, gather_metal
+from damageest_paths.layering.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal
 from damageest_paths.layering.unfilled import Unfilled
 from damageest_paths.process.frames import Frame
 from damageest_paths.process.process import Pass, Plan, Process, extend_line
@@ -98,7 +98,7 @@ def plan_conformal(
     standing: Sweeps | None = None
     waiting: list[tuple[_Work, list[Layer]]] = []
     for floor, torn in list_floors(local, metal, process):
-        standing = standing or Sweeps(gather_metal(metal, local, frame, around, process, COARSER))
+        standing = standing or Sweeps(around.measure_from(body, frame, COARSER * process.bead.width))
         thickest = float(floor.measure(places).distance.max())
         count = max(1, int(np.ceil(thickest / process.height - SPARE)))
         height = min(thickest / count, process.height)

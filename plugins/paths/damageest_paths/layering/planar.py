@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -54,6 +54,19 @@ class Surroundings:
     metal: Any
     others: Sequence[Mesh]
     clearance: Clearance
+    _prepared: dict[tuple[float, ...], Obstacles] = field(default_factory=dict, init=False, repr=False)
+
+    def measure_from(self, body: Any, frame: Frame, width: float) -> Clearance:
+        """The distances, near a body, a Manifold, to what the nozzle must not touch, in the frame's coordinates.
+
+        ``width``: see `Obstacles`. The tree of triangles takes long: one serves all directions of a body.
+        """
+        key = (width, *map(float, body.bounding_box()))
+        if key not in self._prepared:
+            meshes = [Mesh(*to_arrays(self.metal))] if not self.metal.is_empty() else []
+            box = np.array(key[1:])
+            self._prepared[key] = Obstacles([*meshes, *self.others], box[:3], box[3:], width)
+        return self.clearance.with_obstacles(self._prepared[key].turn(frame.turn))
 
 
 def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process) -> Plan:
@@ -106,7 +119,7 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
         made, dropped, shaded = list[Pass](), list[Floats](), list[Floats]()
         if long:
             # what the nozzle must not touch is gathered for the first line: trials of what is left may have none
-            choice = choice or _AxisChoice(process, gather_metal(metal, local, frame, around, process))
+            choice = choice or _AxisChoice(process, around.measure_from(body, frame, width))
             made, dropped, shaded = choice.place(long, top, number)
             made = order_passes(made, passes[-1] if passes else None, choice.clearance, process)
         done = cover([one.points[:, :2] for one in made], width)
@@ -136,17 +149,6 @@ def plan_planar(body: Any, frame: Frame, around: Surroundings, process: Process)
             # what the layers above would fill is of no interest any more
             return Plan(frame, height, (), local, reasons)
     return Plan(frame, height, tuple(passes), _gather(missing), reasons)
-
-
-def gather_metal(
-    metal: Any, body: Any, frame: Frame, around: Surroundings, process: Process, coarser: float = 1.0
-) -> Clearance:
-    """The distances, near a body, to what the nozzle must not touch: the metal, both Manifolds in local coordinates,
-    and the other meshes. ``coarser``: see `Obstacles`."""
-    meshes = [Mesh(*to_arrays(metal))] if not metal.is_empty() else []
-    meshes += [Mesh(frame.to_local(mesh.vertices + frame.origin), mesh.faces) for mesh in around.others]
-    box = np.array(body.bounding_box())
-    return around.clearance.with_obstacles(Obstacles(meshes, box[:3], box[3:], process.bead.width, coarser=coarser))
 
 
 def _find_hanging(held: Any, wanted: Any, aims: Aims, process: Process) -> Any:
