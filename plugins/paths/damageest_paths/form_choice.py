@@ -148,10 +148,10 @@ def _plan_along(plan: Plan) -> Draft:
 
 
 def _is_clearly_cheaper(along: Draft) -> bool:
-    """Whether layers along the floor lose little, and cost clearly less than planes would at least."""
+    """Whether layers along the floor lose little, and cost less than planes at least would, which lose nothing."""
     if along.is_empty or measure_lost(along) > LITTLE or _measure_spill(along) > FARTHEST * along.width:
         return False
-    return measure_merit(along).cost < CHEAPER * bound_planes(along).cost
+    return measure_merit(along).cost < bound_planes(along).cost
 
 
 def _describe(planes: Merit, along: Draft, least: str = "") -> str:

@@ -7,6 +7,7 @@
 # middles.py: lines in the middle of what is narrower than a bead
 # regions.py: regions of a plane as manifold3d's CrossSection, which has the polygons and offsets of Clipper2
 # rings.py: rings within a region, and the spiral that they become
+# sharing.py: shares a region out between ways to hold the tool
 # stripes.py: fills a region with parallel rows that cover all of it
 # trim.py: cuts lines where the middle of a bead may not lie, and lengthens those that are shorter than a pass may be
 # weave.py: fills a region with few long passes

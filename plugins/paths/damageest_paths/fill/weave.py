@@ -90,14 +90,14 @@ def weave_piece(region: Any, pattern: Pattern, bead: Bead, angle: float, style: 
     if free is None and inner.is_empty():
         link = None
     found = [part_lines(join_all(lines, link, bead), bead) for lines in tries]
-    best = min(found, key=lambda lines: _estimate(lines, region, bead))
+    best = min(found, key=lambda lines: estimate(lines, region, bead))
     is_free = pattern == "spiral" or (pattern == "zigzag" and style.is_along)
     if inner.is_empty() or not is_free or _count_long(best, width) == 1:
         return best
     merged = part_lines(join_all([*thin, *draw_one(inner, bead, ahead)], link, bead), bead)
     if _count_long(merged, width) >= _count_long(best, width):
         return best
-    return min(best, merged, key=lambda lines: _estimate(lines, region, bead))
+    return min(best, merged, key=lambda lines: estimate(lines, region, bead))
 
 
 def _count_long(lines: Sequence[Line], width: float) -> int:
@@ -125,7 +125,7 @@ def _measure_aspect(region: Any) -> float:
     return float(long / max(short, 1e-300))
 
 
-def _estimate(lines: Sequence[Line], region: Any, bead: Bead) -> float:
+def estimate(lines: Sequence[Line], region: Any, bead: Bead) -> float:
     """The way along the lines and between them, and what they miss, in bead widths."""
     missed = region - cover([line.points for line in lines], bead.width)
     areas = [float(piece.area()) / bead.width**2 for piece in list_pieces(missed)]

@@ -112,6 +112,21 @@ def follow_line(points: Floats, normals: Floats, parts: Sequence[Sweeps], proces
     return found
 
 
+def find_free_ways(points: Floats, normals: Floats, parts: Sequence[Sweeps], process: Process) -> Flags:
+    """Whether each way to hold the tool, see `list_ways`, may be free (N,M) at points of a pass (N,3)."""
+    ways = list_ways(steady_axes(points, normals, process.turn_rate, process.bead.width), process)
+    return np.asarray(process.gap <= _bound_ways(points, normals, np.array(ways), parts, process).T)
+
+
+def _bound_ways(points: Floats, normals: Floats, ways: Floats, parts: Sequence[Sweeps], process: Process) -> Floats:
+    """An upper bound of the distance (M,N) at each point with each way (M,N,3); 0 where the tool is too oblique."""
+    places = np.tile(points, (len(ways), 1))
+    room = [part.clearance.bound(places, ways.reshape(-1, 3), ROOM * process.gap)[1] for part in parts]
+    least = np.min(room, axis=0).reshape(len(ways), -1)
+    least[[_find_oblique(axis, normals, process) for axis in ways]] = 0.0
+    return np.asarray(least)
+
+
 def _mix(points: Floats, ways: Sequence[Floats], free: Flags, process: Process) -> Floats:
     """Axes (N,3) that are those of the first way but where it is not free: there, and a little before and after, those
     of the free way that leans least from it. ``free``: (ways, stretches)."""
@@ -136,10 +151,7 @@ def _choose_ways(
     count = int(np.clip(measure_along(points)[-1] / (EVERY * process.bead.width), LEAST, MOST))
     sparse = np.unique(np.linspace(0, len(points) - 1, count).round().astype(int))
     axes = np.array([way[sparse] for way in ways])
-    places = np.tile(points[sparse], (len(axes), 1))
-    room = [part.clearance.bound(places, axes.reshape(-1, 3), ROOM * process.gap)[1] for part in parts]
-    room = np.min(room, axis=0).reshape(len(axes), -1)
-    room[[_find_oblique(axis, normals[sparse], process) for axis in axes]] = 0.0
+    room = _bound_ways(points[sparse], normals[sparse], axes, parts, process)
     free, narrow = room >= process.gap, room.min(axis=1) < ROOM * process.gap
     chosen: list[int] = []
     open_ = np.ones(len(sparse), bool)
@@ -150,7 +162,7 @@ def _choose_ways(
         if not worth[best]:
             break
         chosen.append(best)
-        open_ = ~free[[0, *chosen]].any(axis=0)
+        open_ = np.asarray(~free[[0, *chosen]].any(axis=0))
     return [(k, np.repeat(free[k, :-1] | free[k, 1:], np.diff(sparse))) for k in chosen]
 
 

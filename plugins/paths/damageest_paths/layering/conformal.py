@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -14,15 +15,15 @@ from damageest_paths.clearance.clearance import Clearance
 from damageest_paths.clearance.obstacles import COARSER, Obstacles
 from damageest_paths.fill.fill import list_lines
 from damageest_paths.fill.lines import Line
-from damageest_paths.fill.regions import EVEN, cover, drop_narrow, measure_length, resample, smooth_border
-from damageest_paths.holding.follow import follow_line, limit_tilt, make_pass
+from damageest_paths.fill.regions import EVEN, cover, drop_narrow, measure_length, smooth_border
 from damageest_paths.holding.reach import turn_reach
 from damageest_paths.holding.shade import measure_shade
 from damageest_paths.holding.sweeps import Sweeps
-from damageest_paths.layering.planar import COLLIDES, SHADED, SHORT, UNSUPPORTED, Surroundings, crop_metal
+from damageest_paths.layering.placing import Placing
+from damageest_paths.layering.planar import SHORT, UNSUPPORTED, Surroundings, crop_metal
 from damageest_paths.layering.unfilled import Unfilled
 from damageest_paths.process.frames import Frame
-from damageest_paths.process.process import Pass, Plan, Process, extend_line
+from damageest_paths.process.process import Pass, Plan, Process
 from damageest_paths.sheets.floor import Floor, list_floors
 from damageest_paths.sheets.patches import Patch, list_patches
 from damageest_paths.sheets.sheets import (
@@ -249,19 +250,17 @@ class _Work:
         free, width = None, process.bead.width
         if shade is not None:
             free = drop_narrow(patch.draw_region(shade, process), NARROW * width).simplify(EVEN * width)
-        smooth = smooth_border(held, width)
-        lines = list_lines(smooth, process.pattern, process.bead, angle, free, process.shortest, None, style)
-        scrap, longest = SCRAP * width, max((measure_length(line.points) for line in lines), default=0.0)
-        least = max(process.shortest, scrap if longest > scrap else 0.0)
-        long = [line for line in lines if measure_length(line.points) >= least]
-        short = [line.points for line in lines if measure_length(line.points) < least]
-        done: list[Floats] = []
-        dropped: dict[str, list[Floats]] = {COLLIDES: [], SHADED: [], SHORT: short}
-        for line in long:
-            made, left = self._place(patch, line, layer, around)
-            done += made
-            for why, piece in left:
-                dropped[why].append(piece)
+        draw = partial(
+            _draw_long, pattern=process.pattern, bead=process.bead, angle=angle, free=free, shortest=process.shortest,
+            style=style,
+        )  # fmt: skip
+        place = Placing(patch, layer, around, process, self.standing.clearance.reach)
+        long, short = draw(smooth_border(held, width))
+        placed = place.place(long)
+        if placed.is_torn(len(long)):
+            placed = place.share_out(placed, long, held, lambda part: draw(part)[0])
+        self.layer += placed.passes
+        done, dropped = placed.done, {**placed.dropped, SHORT: short}
         gaps = held - cover(done, process.bead.width)
         left_out = {UNSUPPORTED: wanted - held}
         for why, lines_left in dropped.items():
@@ -269,26 +268,12 @@ class _Work:
             gaps -= left_out[why]
         self.unfilled.add_below(patch, left_out, is_first=not layer)
 
-    def _place(
-        self, patch: Patch, line: Line, layer: int, around: Sequence[Sweeps]
-    ) -> tuple[list[Floats], list[tuple[str, Floats]]]:
-        """Adds the passes along a line of the plane. Gives the pieces with a bead (K,2), and those without, each with
-        the reason."""
-        process = self.process
-        places, _ = resample(extend_line(line.points, *process.extend), process.step)
-        points, normals, _ = patch.tree.find(places)
-        least = min(int(np.ceil(process.shortest / process.step)) + 2, len(points))
-        runs = follow_line(points, normals, around, process, least)
-        runs = [run for run in runs if measure_length(points[run.start : run.stop]) >= process.shortest]
-        reach = self.standing.clearance.reach
-        made = [make_pass(points, normals, run, layer, process, reach) for run in runs]
-        self.layer += [replace(one, kind=line.kind) for one in made]
-        stops = [0, *(k for run in runs for k in (run.start, run.stop)), len(places)]
-        spans = [(max(a - 1, 0), b + 1) for a, b in zip(stops[::2], stops[1::2], strict=True) if b > a]
-        left = []
-        for a, b in spans:
-            body = [part.clearance.without_beam() for part in around]
-            upright = limit_tilt(normals[a:b], process.tilt if process.axes == 5 else 0.0)
-            free = all((one.bound(points[a:b], upright, process.gap)[0] >= process.gap).mean() > 0.5 for one in body)
-            left.append((SHADED if free else COLLIDES, places[a:b]))
-        return [places[run.start : run.stop] for run in runs], left
+
+def _draw_long(region: Any, **options: Any) -> tuple[list[Line], list[Floats]]:
+    """The lines that fill a region and are worth a start, and the points of the others; ``options`` of `list_lines`."""
+    lines = list_lines(region, **options)
+    scrap = SCRAP * options["bead"].width
+    longest = max((measure_length(line.points) for line in lines), default=0.0)
+    least = max(options["shortest"], scrap if longest > scrap else 0.0)
+    long = [line for line in lines if measure_length(line.points) >= least]
+    return long, [line.points for line in lines if measure_length(line.points) < least]
