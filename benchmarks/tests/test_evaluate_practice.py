@@ -48,7 +48,7 @@ def ask(*beads: Floats, **options: object) -> Practice:
 
 def test_rows_that_lie_on_metal_have_no_fault() -> None:
     found = ask(line((-10, 0), (10, 0)), line((10, 10), (-10, 10)))
-    assert found == Practice(2.0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0)
+    assert found == Practice(2.0, 1.0, 0, 0, 0, 0.0, 0, 0.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize(("gap", "count"), [(0.8, 1), (1.2, 0)])
@@ -57,6 +57,12 @@ def test_a_bead_that_starts_where_the_last_ended_could_be_joined(gap: float, cou
     assert ask(*beads).joinable == count
     assert ask(*beads, layers=[1, 2]).joinable == 0
     assert ask(*beads, layers=[1, 2]).starts_a_layer == 1
+
+
+def test_starts_are_those_of_a_region_whose_beads_touch() -> None:
+    far, beside = line((-10, 10), (10, 10)), line((-10, 0.7 * WIDTH), (10, 0.7 * WIDTH))
+    found = ask(line((-10, 0), (10, 0)), beside, far)
+    assert (found.starts_a_layer, found.starts_a_region) == (3.0, 1.5)
 
 
 @pytest.mark.parametrize(

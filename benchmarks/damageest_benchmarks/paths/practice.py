@@ -9,6 +9,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from damageest.artefacts import DepositPath, Flags, Floats, Ints, Solid
 from damageest.geometry.rays import RayCaster
@@ -24,6 +27,8 @@ TILTED, JUMP = 10.0, 20.0
 """Degrees between a tool axis and the mean one of its layer, and between two axes nearer than a bead's width."""
 FLOATS, OVERHANGS = 0.2, 3.0
 """Air under a bead, in heights of it: from the first it floats, from the second on it hangs over beside the floor."""
+TOUCHING, FINE = 1.0, 0.25
+"""Distance in bead widths up to which two beads of a layer lie in one region, and that of the places along them."""
 BESIDE = 0.6
 """Distance in bead widths up to which an earlier bead lies under a point."""
 MOST = 1500
@@ -32,12 +37,14 @@ MOST = 1500
 
 @dataclass(frozen=True)
 class Practice:
-    """``starts_a_layer``: beads for each layer of a part; ``joinable``: starts near the end of the bead before, in the
+    """``starts_a_layer``: beads for each layer of a part; ``starts_a_region``: for each region of a layer whose beads
+    touch each other; ``joinable``: starts near the end of the bead before, in the
     same layer; ``reversals``, ``corners``: turns with the process on; ``tilted``: share of the length whose tool axis
     leans from that of its layer; ``jumps`` of the axis; ``air``: between metal and the beads that lie on it, median and
     95 % in bead heights; ``floating``: share of the points with air under their bead."""
 
     starts_a_layer: float
+    starts_a_region: float
     joinable: int
     reversals: int
     corners: int
@@ -52,14 +59,17 @@ def measure_practice(path: DepositPath, metal: Solid) -> Practice:
     """The figures of a path on what is left of a part, ``metal``."""
     beads = list(list_beads(path))
     if not beads:
-        return Practice(0.0, 0, 0, 0, 0.0, 0, float("nan"), float("nan"), 0.0)
-    layers = {(int(path.part[bead[-1]]), int(path.layer[bead[-1]])) for bead in beads}
+        return Practice(0.0, 0.0, 0, 0, 0, 0.0, 0, float("nan"), float("nan"), 0.0)
+    layers: dict[tuple[int, int], list[Ints]] = {}
+    for bead in beads:
+        layers.setdefault((int(path.part[bead[-1]]), int(path.layer[bead[-1]])), []).append(bead)
     turns = np.concatenate([_measure_turns(path.points[bead], SAME_PLACE * path.width) for bead in beads])
     tilted, jumps, length = _measure_axes(path, beads)
     air, lies = _measure_air(path, metal)
     on_metal = air[lies & (air < OVERHANGS)]
     return Practice(
         starts_a_layer=len(beads) / len(layers),
+        starts_a_region=len(beads) / sum(_count_regions(path, own) for own in layers.values()),
         joinable=_count_joinable(path, beads),
         reversals=int((turns > REVERSAL).sum()),
         corners=int((turns > CORNER).sum()),
@@ -77,6 +87,20 @@ def list_beads(path: DepositPath) -> Iterator[Ints]:
     for run in np.split(on, np.flatnonzero(np.diff(on) > 1) + 1):
         if len(run):
             yield np.concatenate([[max(run[0] - 1, 0)], run])
+
+
+def _count_regions(path: DepositPath, beads: list[Ints]) -> int:
+    """How many regions the beads of a layer lie in, those that touch each other in one."""
+    places, number = [], []
+    for k, bead in enumerate(beads):
+        way = np.append(0.0, np.cumsum(path.moves[bead[1:]]))
+        at = np.append(np.arange(0, way[-1], FINE * path.width), way[-1])
+        places.append(np.column_stack([np.interp(at, way, path.points[bead, axis]) for axis in range(3)]))
+        number.append(np.full(len(at), k))
+    near = cKDTree(np.concatenate(places)).query_pairs(TOUCHING * path.width, output_type="ndarray")
+    pairs = np.concatenate(number)[near]
+    ones = np.ones(len(pairs), bool)
+    return int(connected_components(coo_matrix((ones, pairs.T), shape=(len(beads),) * 2))[0])
 
 
 def _measure_turns(points: Floats, least: float) -> Floats:

@@ -62,6 +62,7 @@ class PathRow:
     checked: float
     why: dict[str, float]
     starts_a_layer: float
+    starts_a_region: float
     joinable: int
     reversals: int
     corners: int
@@ -95,13 +96,19 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
     path = stage.run(body=scene.body, left=scene.left, built=None, tolerance=0.02 * stage.width)
     planned = time.process_time()
     assert path is not None
+    return check_path(scene, stage, path, planned - before)
+
+
+def check_path(scene: Scene, stage: Layers, path: DepositPath, seconds: float) -> PathRow:
+    """Checks a path of a scene that a ``stage`` took ``seconds`` of the processor to plan."""
+    before = time.process_time()
     fill, width, height = path.fill, path.width, float(path.heights.min())
     is_some = bool(path.on.any())
     beyond = measure_beyond_need(path, scene.left, stage)
     row = PathRow(
         kind=scene.kind,
         name=scene.name,
-        axes=axes,
+        axes=5 if stage.axes == 5 else 3,
         volume=scene.body.volume,
         width=width,
         height=height,
@@ -121,7 +128,7 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
         layers=path.layers,
         travel=path.travel / path.length if is_some else np.nan,
         between=_measure_between(path) / path.length if is_some else np.nan,
-        seconds=planned - before,
+        seconds=seconds,
         checked=0.0,
         why={item.why: item.volume / scene.body.volume for item in path.unreached},
         **asdict(measure_practice(path, scene.left)),
@@ -129,7 +136,7 @@ def evaluate_scene(scene: Scene, axes: int) -> PathRow:
         beyond_95=beyond.most,
         beyond_mean=beyond.mean,
     )
-    return replace(row, checked=time.process_time() - planned)
+    return replace(row, checked=time.process_time() - before)
 
 
 def _measure_between(path: DepositPath) -> float:
@@ -189,7 +196,7 @@ DEMANDS = (
     Demand("nozzle clear of earlier beads, bead widths", "built", ".2f", least=1e-9),
     Demand("no jump of the rotary axis", "flips", "d", most=0),
     Demand("no reversal with the process on", "reversals", "d", most=0),
-    Demand("starts a layer at most 3", "starts_a_layer", ".1f", most=3.0),
+    Demand("starts a layer and region at most 3", "starts_a_region", ".1f", most=3.0),
     Demand("floating at most 2 %", "floating", ".1%", most=0.02),
     Demand("tilted no more than needed, in the median", "beyond", ".0f", most=0.0),
 )
@@ -223,8 +230,9 @@ def make_table(rows: Sequence[PathRow]) -> str:
 
     head = [
         "deposits", "axes", "number", "out of reach", "filled, least", "spill", "void", "gap", "from beads",
-        "in the beam", "sunk", "flips", "travel, median", "largest", "starts a layer", "reversals", "corners", "tilted",
-        "beyond need, 95 %", "axis jumps", "air, median", "air, 95 %", "floating", "time, median", "largest",
+        "in the beam", "sunk", "flips", "travel, median", "largest", "starts a layer", "and region", "reversals",
+        "corners", "tilted", "beyond need, 95 %", "axis jumps", "air, median", "air, 95 %", "floating",
+        "time, median", "largest",
     ]  # fmt: skip
     lines = [head]
     for kind in [*dict.fromkeys(row.kind for row in rows), "all"]:
@@ -254,6 +262,7 @@ def _make_line(kind: str, axes: int, own: Sequence[PathRow]) -> list[str]:
         f"{np.nanmedian([row.travel for row in some]):.0%}",
         f"{np.nanmax([row.travel for row in some]):.0%}",
         f"{np.median([row.starts_a_layer for row in some]):.1f}, most {max(row.starts_a_layer for row in some):.1f}",
+        f"{np.median([row.starts_a_region for row in some]):.1f}, most {max(row.starts_a_region for row in some):.1f}",
         str(sum(row.reversals for row in some)),
         str(sum(row.corners for row in some)),
         f"{np.median([row.tilted for row in some]):.0%}",
