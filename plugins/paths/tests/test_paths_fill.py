@@ -11,6 +11,7 @@ from damageest_paths.fill.fill import fill_region, list_lines
 from damageest_paths.fill.joints import drop_spurs, end_at_reversals, find_reversals, round_corners
 from damageest_paths.fill.regions import cover, list_pieces, make_region, measure_length
 from damageest_paths.fill.stripes import Bead
+from damageest_paths.fill.trim import lengthen_line
 from damageest_paths.fill.weave import Pattern
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -86,6 +87,14 @@ def test_a_closed_line_with_round_corners_ends_where_it_begins() -> None:
     assert np.allclose(line[0], line[-1])
     assert measure_turns(line).max() < 90
     assert measure_turns(np.concatenate([line, line[1:4]])).max() < 90
+
+
+def test_a_short_line_becomes_a_pass_where_there_is_room() -> None:
+    room, line = CrossSection.square((4, 2), True), np.array([[-0.2, 0.0], [0.0, 0.05], [0.2, 0.0]])
+    longer = lengthen_line(line, 0.8, room, room, BEAD.width)
+    assert measure_length(longer) == pytest.approx(0.8)
+    assert np.allclose(longer.mean(axis=0), 0)
+    assert lengthen_line(line, 0.8, room, CrossSection.square((0.5, 0.5), True), BEAD.width) is line
 
 
 def test_a_spur_is_left_out() -> None:

@@ -80,7 +80,8 @@ def list_lines(
     if free is not None:
         lines += _fill_beside(region, lines, bead, free, shortest, firm)
     within = shift_border(region, -bead.width / 4) if free is None else free
-    return _tidy(lines, region, within, bead)
+    tidy = _tidy(lines, region, within, bead)
+    return [Line(lengthen_line(line.points, shortest, region, free, bead.width), line.kind) for line in tidy]
 
 
 def _tidy(lines: Sequence[Line], region: Any, within: Any, bead: Bead) -> list[Line]:

@@ -34,12 +34,14 @@ def trim_line(line: Floats, free: Any, width: float) -> list[Floats]:
 
 
 def lengthen_line(line: Floats, shortest: float, region: Any, free: Any, width: float) -> Floats:
-    """A line (2,2) that is shorter than a pass may be, made that long about its middle; the line as it is where its
-    bead would then cover much outside of the region, or its ends would not lie in ``free``, None for everywhere."""
-    length = measure_length(line)
-    if len(line) != 2 or length >= shortest or length <= 0:
+    """A line (K,2) that is shorter than a pass may be, made straight and that long about its middle; the line as it is
+    where its bead would then cover much outside of the region, or its ends would not lie in ``free``, None for
+    everywhere."""
+    ends = line[[0, -1]]
+    length = measure_length(ends)
+    if measure_length(line) >= shortest or length <= 0:
         return line
-    middle, along = line.mean(axis=0), (line[1] - line[0]) / length
+    middle, along = ends.mean(axis=0), (ends[1] - ends[0]) / length
     half = 0.5 * shortest * (1 + 1e-9) * along
     longer = np.array([middle - half, middle + half])
     if free is not None and not is_within(longer, free).all():
