@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from manifold3d import Manifold
 
-from damageest.artefacts import Flags, Floats
-from tests.path_shapes import BLOCK, cut, plan
+from damageest.artefacts import DepositPath, Flags, Floats
+from tests.path_shapes import BLOCK, Loss, cut, plan
 
 AXES = list_axes(np.radians(60))
 LINE = np.column_stack([np.linspace(0, 20, 81), np.zeros(81), np.zeros(81)])
@@ -70,14 +70,20 @@ def test_bridges_do_not_overlap_and_keep_within_two_breaks(places: list[int], wi
             assert np.ptp(broken) == len(broken) - 1
 
 
-@pytest.mark.parametrize(("radius", "depth", "cone", "standoff"), [(7, 4, 35.0, 3.0), (6, 3, 35.0, 3.0)])
-def test_a_ring_beside_the_wall_of_a_pocket_is_one_pass(
-    radius: float, depth: float, cone: float, standoff: float
-) -> None:
+def plan_pocket() -> tuple[Loss, DepositPath]:
+    pocket = cut(BLOCK, Manifold.cylinder(8, 7, 7, 48).translate((0, 0, -4)))
+    fat = {"tip_radius": 1.6, "cone_angle": 35.0, "length": 60.0, "body_radius": 12.0}
+    return pocket, plan(pocket, direction=(0, 0, 1), axes=5, nozzle=fat, simulate=False)
+
+
+def test_a_ring_beside_the_wall_of_a_pocket_is_one_pass() -> None:
     """The tool leans from the wall all round; it stopped at each of eight axes."""
-    pocket = cut(BLOCK, Manifold.cylinder(2 * depth, radius, radius, 64).translate((0, 0, -depth)))
-    fat = {"tip_radius": 1.6, "cone_angle": cone, "length": 60.0, "body_radius": 12.0}
-    path = plan(pocket, direction=(0, 0, 1), axes=5, nozzle=fat, standoff=standoff)
-    assert path.passes == path.layers == depth
+    _, path = plan_pocket()
+    assert path.passes == path.layers == 4
     assert path.unreached_volume < 0.001 * path.deposit_volume
-    assert measure_nozzle(path, pocket.left, 0.2) > 0
+
+
+@pytest.mark.slow
+def test_the_tool_keeps_clear_where_it_turns_over_a_break() -> None:
+    pocket, path = plan_pocket()
+    assert measure_nozzle(path, pocket.left, 0.05) > 0
