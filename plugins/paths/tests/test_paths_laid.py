@@ -61,7 +61,7 @@ def test_large_beads_stand_out_and_a_note_says_so() -> None:
     assert get_fill(laid).spill > 1.3 * get_fill(plain).spill
     assert get_fill(laid).sunk > get_fill(plain).sunk
     assert laid.surplus_volume > 0.4 * laid.deposit_volume
-    assert [note for note in laid.notes if "mill it off" in note and f"add {laid.surplus_volume:.3g}" in note]
+    assert [note for note in laid.notes if "mill it off" in note and f"add {laid.surplus_volume:.4g}" in note]
     assert sum("mill it off" in note for note in laid.notes) == 1
 
 
