@@ -61,11 +61,11 @@ def write_measured(table: str, name: str, write: Path | None) -> None:
     from damageest_benchmarks.readme import replace_between_marks
 
     if write:
-        measured = describe_measurement(f"`{shlex.join(['damageest', *leave_out_files(sys.argv[1:])])}`")
+        measured = describe_measurement(f"`{shlex.join(['damageest', *_leave_out_files(sys.argv[1:])])}`")
         write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", name), encoding="utf-8")
 
 
-def leave_out_files(words: list[str]) -> list[str]:
+def _leave_out_files(words: list[str]) -> list[str]:
     """The words of a command without the files of this machine, --write and --out."""
     files = {"--write", "--out"}
     pairs = zip(["", *words], words, strict=False)

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import shlex
-import sys
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from damageest_evaluate.commands.counted import show_table
 
-from damageest_benchmarks.commands._counted import AsJson, Timeout, Write, prepare_places
+from damageest_benchmarks.commands._counted import AsJson, Timeout, Write, prepare_places, write_measured
 
 
 def command(
@@ -63,7 +61,7 @@ def command(
         rows.append(runs)
     table = make_speed_table(rows)
     show_table(table, rows, as_json)
-    _write(write, table, "speed")
+    write_measured(table, "speed", write)
 
 
 def _measure_whole(
@@ -79,15 +77,4 @@ def _measure_whole(
     runs = measure_whole(names, programs or [OWN], repeat, timeout, tell)
     table = make_whole_table(runs)
     show_table(table, [asdict(run) for run in runs], as_json)
-    _write(write, table, "whole")
-
-
-def _write(write: Path | None, table: str, mark: str) -> None:
-    from damageest_evaluate.tables import describe_measurement
-
-    from damageest_benchmarks.commands._counted import leave_out_files
-    from damageest_benchmarks.readme import replace_between_marks
-
-    if write:
-        measured = describe_measurement(f"`{shlex.join(['damageest', *leave_out_files(sys.argv[1:])])}`")
-        write.write_text(replace_between_marks(write, f"{table}\n\n{measured}", mark), encoding="utf-8")
+    write_measured(table, "whole", write)

@@ -117,13 +117,13 @@ def plan_in_form(form: Form, plan: Plan, is_shell: bool = False, is_sink_given: 
     """The draft of a form. ``auto``: planes; where they lose much of the deposit because they are planes, as of the
     crescent of a worn bore, surfaces along the floor if these lose half of all that planes lose, or less.
 
-    ``is_shell``: whether planes would be so many that surfaces along the floor are tried first; planes are not planned
-    where these lose little, and cost clearly less than planes at least. ``is_sink_given``: whether the job says how
-    deep beads may lie in intact metal.
+    ``is_shell``: for ``auto``, whether planes would be so many that surfaces along the floor are tried first; planes
+    are not planned where these lose little, and cost less than planes at least. ``is_sink_given``: whether the job says
+    how deep beads may lie in intact metal.
     """
     if form == "conformal":
         return replace(plan(PLANNERS[form]), layer_form=form)
-    along = _plan_along(plan) if form == "auto" and is_shell else None
+    along = _plan_along(plan) if is_shell else None
     if along is not None and _is_clearly_cheaper(along):
         return replace(along, why=_describe(bound_planes(along), along, "at least "))
     planar = plan(PLANNERS["planar"])

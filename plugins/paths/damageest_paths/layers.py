@@ -286,7 +286,8 @@ class Layers(Path):
             chosen = find_open_normal(body, left, tolerance) if along_normal and direction is None else direction
             return draft_path(task, nozzle, self.standoff or self.width, process, self.simulate, chosen, planner)
 
-        draft = plan_in_form(self.layers, plan, is_thin_shell(body, self.height), self.penetration is not None)
+        is_shell = self.layers == "auto" and is_thin_shell(body, self.height)
+        draft = plan_in_form(self.layers, plan, is_shell, self.penetration is not None)
         if self.layers == "conformal" and draft.is_empty:
             why = "; ".join(item.why for item in draft.unreached)
             raise StageError(f"no pass of a conformal layer can be laid: {why}", "layers: planar, or another direction")

@@ -8,6 +8,7 @@ import numpy as np
 
 from damageest.artefacts import Flags, Floats
 from damageest_paths.clearance.turning import turn_evenly
+from damageest_paths.fill.regions import find_runs
 from damageest_paths.process.process import measure_along
 
 FARTHEST = np.radians(80.0)
@@ -39,7 +40,7 @@ def list_bridges(
         shape: one of `LONGER` and one of `PLACES`.
     """
     along = measure_along(points)
-    edges = np.flatnonzero(np.diff(np.concatenate([[1], goes_on, [1]]))).reshape(-1, 2)
+    edges = find_runs(~goes_on)
     # each break with the end of the one before, and the start of the next
     spans = [(0, 0), *map(tuple, edges.tolist()), (len(points) - 1, len(points) - 1)]
     found: list[Bridge] = []

@@ -158,6 +158,11 @@ def find_main_angle(region: Any) -> float:
     return found
 
 
+def find_runs(wanted: Flags) -> Ints:
+    """The first and the last number (K,2), not included, of each stretch of numbers that are ``wanted`` (N,)."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(int), [0]]))).reshape(-1, 2)
+
+
 def resample(line: Floats, longest: float) -> tuple[Floats, Floats]:
     """Points (N,3) along a polyline (K,3), no farther from each other than ``longest``, with its corners; and the
     number of the corner (N,) that each is, -1 for one between corners."""

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from damageest.artefacts import Flags, Floats, Ints
-from damageest_paths.fill.regions import cover, drop_narrow, list_pieces, shift_border, unite_regions
+from damageest_paths.fill.regions import cover, drop_narrow, find_runs, list_pieces, shift_border, unite_regions
 from damageest_paths.fill.stripes import Bead
 
 MOST = 4
@@ -78,5 +78,4 @@ def _share_points(points: Floats, free: Flags) -> Ints:
 
 def _list_runs(line: Floats, wanted: Flags) -> list[Floats]:
     """The stretches (K,2) of a line at whose points it is wanted."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], wanted.astype(int), [0]])))
-    return [line[start:stop] for start, stop in zip(edges[::2], edges[1::2], strict=True)]
+    return [line[start:stop] for start, stop in find_runs(wanted)]

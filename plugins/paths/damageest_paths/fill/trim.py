@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from damageest.artefacts import Floats
-from damageest_paths.fill.regions import cover, is_within, measure_length, resample
+from damageest_paths.fill.regions import cover, find_runs, is_within, measure_length, resample
 
 FINE = 0.05
 """Distance, in bead widths, of the places of a line at which it is looked whether it may be there."""
@@ -23,9 +23,8 @@ def trim_line(line: Floats, free: Any, width: float) -> list[Floats]:
     inside = is_within(points, free)
     if inside.all():
         return [line]
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
     pieces = []
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in find_runs(inside):
         kept = np.flatnonzero(corner[start:stop] >= 0)
         kept = np.unique(np.concatenate([[0], kept, [stop - start - 1]])) + start
         if len(kept) > 1:

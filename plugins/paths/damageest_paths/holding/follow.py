@@ -10,7 +10,7 @@ import numpy as np
 from damageest.artefacts import Flags, Floats, Ints
 from damageest.geometry.vectors import normalise
 from damageest_paths.clearance.gauges import Gauge, LeastGauge
-from damageest_paths.fill.regions import find_corners
+from damageest_paths.fill.regions import find_corners, find_runs
 from damageest_paths.holding.reach import keep_reached
 from damageest_paths.holding.steady import steady_axes
 from damageest_paths.holding.sweeps import Sweeps
@@ -228,11 +228,11 @@ def _cut(free: Flags, least: int) -> list[tuple[int, int, int]]:
 
 
 def _find_longest(free: Flags) -> tuple[int, int]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(int), [0]])))
-    if not len(edges):
+    runs = find_runs(free)
+    if not len(runs):
         return 0, 0
-    k = int(np.argmax(edges[1::2] - edges[::2]))
-    return int(edges[2 * k]), int(edges[2 * k + 1])
+    start, stop = runs[np.argmax(runs[:, 1] - runs[:, 0])]
+    return int(start), int(stop)
 
 
 def make_pass(points: Floats, normals: Floats, run: Run, layer: int, process: Process, reach: float) -> Pass:
